@@ -1,0 +1,187 @@
+"""The Dr.Jit backend: which one, where its LLVM comes from, and its array types.
+
+Dr.Jit compiles every formula at run time, through LLVM on the processor or through CUDA. The LLVM
+shared library is looked for in this order:
+
+1. the environment variable ``DRJIT_LIBLLVM_PATH``, if the user has set it;
+2. the library of the PyPI package ``karellen-llvm-core`` (Linux x86-64), twice as fast here as Debian's 19;
+3. whatever Dr.Jit finds on the system by itself.
+
+LLVM 15 and 16 abort the process on ``dr.minimum`` and LLVM 14 is refused by Dr.Jit, so a system library
+older than 17 is refused here with a message instead. The environment variable ``PBRDF_BACKEND``
+(``auto``, ``llvm`` or ``cuda``) or :func:`set_backend` choose the backend; ``auto`` takes CUDA if a device
+is there, else LLVM.
+"""
+
+from __future__ import annotations
+
+import importlib.metadata
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from pbrdf.errors import BackendError
+
+__all__ = [
+    "BACKENDS",
+    "Backend",
+    "find_bundled_llvm",
+    "get_backend",
+    "llvm_version",
+    "point_drjit_to_llvm",
+    "set_backend",
+    "thread_count",
+]
+
+BACKENDS = ("auto", "llvm", "cuda")
+MINIMUM_LLVM = 17
+ENVIRONMENT_VARIABLE = "PBRDF_BACKEND"
+LIBRARY_VARIABLE = "DRJIT_LIBLLVM_PATH"
+
+_INSTALL_HINT = (
+    f"Install an LLVM shared library of version {MINIMUM_LLVM} or newer: on Linux x86-64 "
+    "`pip install karellen-llvm-core`; on Debian or Ubuntu `apt install libllvm19`; on macOS "
+    "`brew install llvm`; on Windows the LLVM installer. If it lies in an unusual place, set "
+    "DRJIT_LIBLLVM_PATH to the full path of the shared library."
+)
+
+
+@dataclass(frozen=True)
+class Backend:
+    """Array types of one Dr.Jit backend, double precision unless the name says otherwise.
+
+    Attributes
+    ----------
+    name
+        ``"llvm"`` or ``"cuda"``.
+    Float, UInt32, Bool
+        Differentiable Dr.Jit array types: float64, uint32 and mask.
+    module
+        The Dr.Jit module that holds them, ``drjit.llvm.ad`` or ``drjit.cuda.ad``.
+    """
+
+    name: str
+    module: ModuleType
+
+    @property
+    def Float(self) -> Any:
+        return self.module.Float64
+
+    @property
+    def UInt32(self) -> Any:
+        return self.module.UInt32
+
+    @property
+    def Bool(self) -> Any:
+        return self.module.Bool
+
+
+_chosen: str | None = None
+_active: Backend | None = None
+
+
+def find_bundled_llvm() -> Path | None:
+    """Return the path of the libLLVM that the package ``karellen-llvm-core`` installed, or None."""
+    try:
+        files = importlib.metadata.files("karellen-llvm-core") or []
+    except importlib.metadata.PackageNotFoundError:
+        return None
+    candidates = [f for f in files if f.name == "libLLVM.so" or f.name.startswith("libLLVM-")]
+    for candidate in sorted(candidates, key=lambda f: f.name != "libLLVM.so"):
+        path = Path(str(candidate.locate())).resolve()
+        if path.exists():
+            return path
+    return None
+
+
+def set_backend(name: str) -> None:
+    """Choose the backend for everything evaluated from now on.
+
+    Parameters
+    ----------
+    name
+        ``"auto"``, ``"llvm"`` or ``"cuda"``.
+
+    Raises
+    ------
+    BackendError
+        If the name is unknown.
+    """
+    global _chosen, _active
+    if name not in BACKENDS:
+        raise BackendError(f"unknown backend {name!r}: choose one of {', '.join(BACKENDS)}")
+    _chosen, _active = name, None
+
+
+def get_backend() -> Backend:
+    """Return the active backend, starting Dr.Jit the first time.
+
+    Raises
+    ------
+    BackendError
+        If the backend asked for is not usable on this machine; the message says what to install.
+    """
+    global _active
+    if _active is None:
+        name = _chosen or os.environ.get(ENVIRONMENT_VARIABLE) or "auto"
+        if name not in BACKENDS:
+            raise BackendError(
+                f"the environment variable {ENVIRONMENT_VARIABLE} is {name!r}: set it to one of "
+                f"{', '.join(BACKENDS)}, or unset it"
+            )
+        _active = _start(name)
+    return _active
+
+
+def point_drjit_to_llvm() -> None:
+    """Set ``DRJIT_LIBLLVM_PATH`` to the packaged LLVM, unless the user has set it.
+
+    Dr.Jit looks for LLVM when it is imported, so this runs when ``pbrdf`` is.
+    """
+    if LIBRARY_VARIABLE not in os.environ and (bundled := find_bundled_llvm()) is not None:
+        os.environ[LIBRARY_VARIABLE] = str(bundled)
+
+
+def _start(name: str) -> Backend:
+    import drjit as dr
+
+    if name in ("cuda", "auto") and dr.has_backend(dr.JitBackend.CUDA):
+        import drjit.cuda.ad as module
+
+        return Backend("cuda", module)
+    if name == "cuda":
+        raise BackendError(
+            "the CUDA backend was asked for, but Dr.Jit finds no CUDA device or driver on this machine: "
+            "choose the backend llvm, or install an NVIDIA driver"
+        )
+    if not dr.has_backend(dr.JitBackend.LLVM):
+        raise BackendError(f"Dr.Jit finds no usable LLVM on this machine. {_INSTALL_HINT}")
+    version = llvm_version()
+    if version is not None and version[0] < MINIMUM_LLVM:
+        found = ".".join(map(str, version))
+        late = (
+            "Dr.Jit was imported before pbrdf and took it: import pbrdf first. "
+            if find_bundled_llvm() is not None
+            else ""
+        )
+        raise BackendError(f"the LLVM that Dr.Jit loaded is version {found}, too old. {late}{_INSTALL_HINT}")
+    import drjit.llvm.ad as llvm_module
+
+    return Backend("llvm", llvm_module)
+
+
+def llvm_version() -> tuple[int, ...] | None:
+    """Return the version of the LLVM that Dr.Jit has loaded, or None where it does not tell."""
+    import drjit.detail as detail
+
+    version = detail.llvm_version()
+    return tuple(version) if version else None
+
+
+def thread_count() -> int:
+    """Return the number of worker threads that Dr.Jit's LLVM backend uses."""
+    import drjit as dr
+
+    return int(dr.thread_count())

@@ -1,0 +1,363 @@
+"""The edge between user arrays (scalars, NumPy, xarray, Dr.Jit) and the models' kernels.
+
+Angles and parameters are checked and broadcast here, sent to the Dr.Jit backend in chunks, and the results
+come back as the kind of array that went in. Formulas are nowhere in this file.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pbrdf.backend import Backend, get_backend
+from pbrdf.errors import ModelError
+from pbrdf.optics.geometry import geometry_from_angles
+from pbrdf.optics.quadrature import CLEAR_WEDGE, SIGMA_25
+
+if TYPE_CHECKING:
+    from pbrdf.models.base import Model
+
+__all__ = ["CHUNK", "kernel_from_angles", "mueller", "stokes"]
+
+#: Directions evaluated at a time: bounds the memory (16 float64 each) and keeps all threads busy.
+CHUNK = 1 << 20
+STOKES = ["I", "Q", "U", "V"]
+#: Cosines up to this count as at or below the horizon, where the BRDF is 0.
+_HORIZON = 1e-12
+
+
+def is_drjit(value: Any) -> bool:
+    """Whether a value is a Dr.Jit array (without importing Dr.Jit)."""
+    return type(value).__module__.startswith("drjit")
+
+
+def is_symbolic(value: Any) -> bool:
+    """Whether a Dr.Jit array is inside a symbolic loop or call, so that its content cannot be looked at."""
+    import drjit as dr
+
+    if dr.depth_v(value) > 1:
+        return any(is_symbolic(v) for v in value)
+    array = value.array if dr.is_tensor_v(value) else value
+    return dr.is_jit_v(array) and array.state == dr.VarState.Symbolic
+
+
+def drjit_to_numpy(value: Any) -> np.ndarray:
+    """Content of a Dr.Jit array or tensor as a float64 NumPy array; a single entry gives a scalar."""
+    import drjit as dr
+
+    array = np.asarray(dr.detach(value).numpy(), dtype=float)
+    return array.reshape(()) if array.size == 1 and array.ndim == 1 else array
+
+
+def to_numpy(value: Any) -> np.ndarray | None:
+    """Content of any array, or None for a symbolic Dr.Jit array."""
+    if is_drjit(value):
+        return None if is_symbolic(value) else drjit_to_numpy(value)
+    return np.asarray(value, dtype=float)
+
+
+def kernel_from_angles(model: Model, theta_i: Any, theta_r: Any, phi: Any, values: Any, part: str) -> Any:
+    """Mueller matrix (nested lists) from angles, 0 at and below the horizon; over Dr.Jit floats, unchecked."""
+    import drjit as dr
+
+    visible = (dr.cos(theta_i) > _HORIZON) & (dr.cos(theta_r) > _HORIZON)
+    theta_i, theta_r = dr.select(visible, theta_i, 0.0), dr.select(visible, theta_r, 0.0)
+    f = model.kernel(geometry_from_angles(theta_i, theta_r, phi), values, part)
+    return [[0.0 if _is_zero(x) else dr.select(visible, x, 0.0) for x in row] for row in f]
+
+
+def mueller(model: Model, theta_i: Any, theta_r: Any, phi: Any, part: str) -> Any:
+    """See :meth:`pbrdf.models.base.Model.mueller`."""
+
+    def function(matrix: Any) -> list[Any]:
+        return [x for row in matrix for x in row]
+
+    return _evaluate(model, theta_i, theta_r, phi, part, function, (4, 4))
+
+
+def stokes(model: Model, theta_i: Any, theta_r: Any, phi: Any, incident: Any, part: str) -> Any:
+    """See :meth:`pbrdf.models.base.Model.stokes`."""
+    if is_drjit(incident) or (not isinstance(incident, Sequence) and np.ndim(incident) > 1):
+        return _apply(mueller(model, theta_i, theta_r, phi, part), incident)
+    S = check_incident(incident)
+
+    def function(matrix: Any) -> list[Any]:
+        return [_weighted_sum(row, S) for row in matrix]
+
+    return _evaluate(model, theta_i, theta_r, phi, part, function, (4,))
+
+
+def check_incident(incident: Any) -> list[float]:
+    """Check one incident Stokes vector and return it as four floats.
+
+    Raises
+    ------
+    ModelError
+        If it is not four finite numbers with positive intensity and a degree of polarisation ≤ 1.
+    """
+    try:
+        S = np.asarray(incident, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise ModelError(f"incident={incident!r} is not a Stokes vector of four numbers") from error
+    if S.shape[-1:] != (4,):
+        raise ModelError(f"incident has shape {S.shape}: a Stokes vector has four numbers in its last dimension")
+    polarised = np.sqrt((S[..., 1:] ** 2).sum(-1))
+    bad = ~(np.isfinite(S).all(-1) & (S[..., 0] > 0.0) & (polarised <= S[..., 0] * (1.0 + 1e-9)))
+    if bad.any():
+        raise ModelError(
+            f"incident={incident!r} is not the Stokes vector of any light: it must be finite, I > 0 and "
+            "√(Q² + U² + V²) ≤ I"
+        )
+    return S.tolist()
+
+
+def _weighted_sum(row: Sequence[Any], weights: Sequence[float]) -> Any:
+    total: Any = 0.0
+    for value, weight in zip(row, weights, strict=True):
+        if weight != 0.0 and not _is_zero(value):
+            total = total + (value if weight == 1.0 else value * weight)
+    return total
+
+
+def _is_zero(value: Any) -> bool:
+    return isinstance(value, float) and value == 0.0
+
+
+def _apply(matrix: Any, incident: Any) -> Any:
+    """Multiply Mueller matrices with an array of incident Stokes vectors."""
+    import drjit as dr
+
+    if is_drjit(matrix):
+        if dr.is_tensor_v(matrix):
+            raise ModelError("with tensor angles, give the incident Stokes vector as four plain numbers")
+        return matrix @ incident
+    check_incident(incident)
+    if type(matrix).__module__.startswith("xarray"):
+        import xarray as xr
+
+        if not isinstance(incident, xr.DataArray):
+            raise ModelError("with xarray angles, give arrays of incident light as a DataArray over stokes_in")
+        return xr.dot(matrix, incident, dim="stokes_in")
+    return np.einsum("...ij,...j->...i", matrix, np.asarray(incident, dtype=float))
+
+
+def _evaluate(
+    model: Model,
+    theta_i: Any,
+    theta_r: Any,
+    phi: Any,
+    part: str,
+    function: Callable[[Any], list[Any]],
+    shape: tuple[int, ...],
+) -> Any:
+    angles = {"theta_i": theta_i, "theta_r": theta_r, "phi": phi}
+    everything = [*angles.values(), *model.values.values()]
+    if any(is_drjit(v) for v in everything):
+        return _evaluate_drjit(model, angles, part, function, shape)
+    if "xarray" in sys.modules:
+        import xarray as xr
+
+        if any(isinstance(v, xr.DataArray) for v in everything):
+            return _evaluate_xarray(model, angles, part, function, shape)
+    return _evaluate_numpy(model, angles, model.values, part, function, shape)
+
+
+def check_angles(angles: dict[str, Any]) -> dict[str, np.ndarray]:
+    """Check angles in radians and return them as float64 arrays.
+
+    Raises
+    ------
+    ModelError
+        If one is not a finite number or a zenith angle lies outside [0, π/2]; says where and whether it looks
+        like degrees.
+    """
+    checked = {}
+    for name, value in angles.items():
+        try:
+            array = np.asarray(value, dtype=float)
+        except (TypeError, ValueError) as error:
+            raise ModelError(f"{name} is not a number or an array of numbers: {value!r}") from error
+        bad = ~np.isfinite(array)
+        if name != "phi":
+            bad |= (array < 0.0) | (array > 0.5 * math.pi)
+        if bad.any():
+            index = tuple(int(i[0]) for i in np.nonzero(bad)) if array.ndim else ()
+            where = f" at index {index}" if array.ndim else ""
+            rule = "a finite number" if name == "phi" else "within [0, π/2] radians"
+            worst = array[index]
+            hint = "; is it in degrees?" if name != "phi" and worst > 0.5 * math.pi else ""
+            raise ModelError(f"{name}={worst:g}{where} must be {rule}{hint}")
+        checked[name] = array
+    return checked
+
+
+def _evaluate_numpy(
+    model: Model,
+    angles: dict[str, Any],
+    values: Any,
+    part: str,
+    function: Callable[[Any], list[Any]],
+    shape: tuple[int, ...],
+) -> np.ndarray:
+    import drjit as dr
+
+    arrays = {**check_angles(angles), **{k: np.asarray(v, dtype=float) for k, v in values.items()}}
+    try:
+        grid = np.broadcast_shapes(*(a.shape for a in arrays.values()))
+    except ValueError as error:
+        shapes = ", ".join(f"{k} {a.shape}" for k, a in arrays.items() if a.ndim)
+        raise ModelError(f"angles and parameters do not broadcast against each other: {shapes}") from error
+    total = math.prod(grid)
+    flat = {k: (a.item() if a.size == 1 else np.broadcast_to(a, grid).ravel()) for k, a in arrays.items()}
+    backend = get_backend()
+    width = math.prod(shape)
+    result = np.empty((total, width))
+    dielectric = not np.any(arrays["kappa"])
+    for start in range(0, total, CHUNK):
+        stop = min(start + CHUNK, total)
+        piece = {k: (v if isinstance(v, float) else v[start:stop]) for k, v in flat.items()}
+        inputs = {k: backend.Float(v) for k, v in piece.items() if not isinstance(v, float)}
+        out = dr.zeros(backend.Float, (stop - start) * width)
+        for lanes in _lane_groups(piece, stop - start, model, part):
+            _launch(model, backend, piece, inputs, lanes, stop - start, dielectric, part, function, out)
+        result[start:stop] = out.numpy().reshape(-1, width)
+    return result.reshape(*grid, *shape)
+
+
+def _lane_groups(piece: dict[str, Any], size: int, model: Model, part: str) -> list[np.ndarray | None]:
+    """Sort the directions by the rule that averages over the facets, so that neighbouring lanes agree.
+
+    None stands for all directions in their order.
+    """
+    if part == "specular" or model.chosen["accuracy"] != "default":
+        return [None]
+    sigma = np.asarray(piece["sigma"])
+    theta = np.maximum(piece["theta_i"], piece["theta_r"])
+    wedge = ~((sigma * CLEAR_WEDGE < 1.0 / np.tan(np.maximum(theta, 1e-6))) & (sigma <= SIGMA_25))
+    wedge = np.broadcast_to(wedge, (size,))
+    if wedge.all() or not wedge.any():
+        return [None]
+    return [np.flatnonzero(~wedge).astype(np.uint32), np.flatnonzero(wedge).astype(np.uint32)]
+
+
+def _launch(
+    model: Model,
+    backend: Backend,
+    scalars: dict[str, Any],
+    inputs: dict[str, Any],
+    lanes: np.ndarray | None,
+    size: int,
+    dielectric: bool,
+    part: str,
+    function: Callable[[Any], list[Any]],
+    out: Any,
+) -> None:
+    """Evaluate some directions and scatter the results into ``out``."""
+    import drjit as dr
+
+    Float, UInt32 = backend.Float, backend.UInt32
+    index = dr.arange(UInt32, size) if lanes is None else UInt32(lanes)
+
+    def fetch(name: str) -> Any:
+        # scalars are opaque, so that a new value does not mean a new kernel
+        return dr.gather(Float, inputs[name], index) if name in inputs else dr.opaque(Float, scalars[name])
+
+    values: dict[str, Any] = {p.name: fetch(p.name) for p in model.parameters}
+    if dielectric:
+        values["kappa"] = None
+    f = kernel_from_angles(model, fetch("theta_i"), fetch("theta_r"), fetch("phi"), values, part)
+    outputs = function(f)
+    for j, value in enumerate(outputs):
+        if not _is_zero(value):
+            dr.scatter(out, value, index * len(outputs) + j)
+    dr.eval(out)
+
+
+def _evaluate_xarray(
+    model: Model,
+    angles: dict[str, Any],
+    part: str,
+    function: Callable[[Any], list[Any]],
+    shape: tuple[int, ...],
+) -> Any:
+    import xarray as xr
+
+    named = {**angles, **model.values}
+    arrays = dict(zip(named, xr.broadcast(*(xr.DataArray(v) for v in named.values())), strict=True))
+    template = arrays["theta_i"]
+    data = _evaluate_numpy(
+        model,
+        {k: arrays[k].values for k in angles},
+        {k: arrays[k].values if np.ndim(v) else v for k, v in model.values.items()},
+        part,
+        function,
+        shape,
+    )
+    extra = ["stokes_out", "stokes_in"][: len(shape)]
+    result = xr.DataArray(
+        data,
+        dims=[*template.dims, *extra],
+        coords={**template.coords, **{name: STOKES for name in extra}},
+        name="mueller" if len(shape) == 2 else "stokes",
+    )
+    result.attrs.update(units="1/sr", long_name="BRDF Mueller matrix" if len(shape) == 2 else "Stokes radiance")
+    return result
+
+
+def _evaluate_drjit(
+    model: Model,
+    angles: dict[str, Any],
+    part: str,
+    function: Callable[[Any], list[Any]],
+    shape: tuple[int, ...],
+) -> Any:
+    import drjit as dr
+
+    given = [v for v in [*angles.values(), *model.values.values()] if is_drjit(v)]
+    tensors = [v for v in given if dr.is_tensor_v(v)]
+    Array = type(tensors[0].array) if tensors else type(given[0])
+    Float = dr.replace_type_t(Array, dr.VarType.Float32 if dr.type_v(Array) == dr.VarType.Float32 else dr.VarType.Float64)
+    for name, value in angles.items():
+        if (content := to_numpy(value)) is not None:
+            check_angles({name: content})
+    grid: tuple[int, ...] | None = None
+    if tensors:
+        grid = np.broadcast_shapes(*(tuple(v.shape) for v in tensors))
+
+    def flatten(value: Any) -> Any:
+        if is_drjit(value) and dr.is_tensor_v(value):
+            assert grid is not None
+            return Float((value + dr.zeros(type(value), grid)).array)
+        return Float(value) if is_drjit(value) else dr.opaque(Float, float(value))
+
+    values: dict[str, Any] = {name: flatten(value) for name, value in model.values.items()}
+    kappa = to_numpy(model.values["kappa"])
+    if kappa is not None and not kappa.any() and not dr.grad_enabled(values["kappa"]):
+        values["kappa"] = None
+    f = kernel_from_angles(model, *(flatten(angles[k]) for k in ("theta_i", "theta_r", "phi")), values, part)
+    outputs = [Float(x) for x in function(f)]
+    if grid is None:
+        module = sys.modules[Float.__module__]
+        suffix = "64" if dr.type_v(Float) == dr.VarType.Float64 else ""
+        if len(shape) == 2:
+            Matrix = getattr(module, f"Matrix4f{suffix}")
+            return Matrix([[outputs[4 * i + j] for j in range(4)] for i in range(4)])
+        return getattr(module, f"Array4f{suffix}")(outputs)
+    Tensor = dr.tensor_t(Float)
+    return Tensor(dr.ravel(_interleave(outputs), order="F"), (*grid, *shape))
+
+
+def _interleave(outputs: list[Any]) -> Any:
+    import drjit as dr
+
+    Float = type(outputs[0])
+    size = max(dr.width(x) for x in outputs)
+    flat = dr.zeros(Float, size * len(outputs))
+    index = dr.arange(dr.uint32_array_t(Float), size) * len(outputs)
+    for j, value in enumerate(outputs):
+        dr.scatter(flat, value, index + j)
+    return flat
