@@ -78,6 +78,21 @@ class Backend:
         return self.module.Bool
 
 
+    def upload(self, array_type: Any, values: Any) -> Any:
+        """Copy a NumPy array into memory of Dr.Jit's own.
+
+        A Dr.Jit array made from a NumPy array may share its memory, whose alignment is a matter of chance and
+        part of the compiled kernel: without the copy the same kernel is compiled again and again.
+        """
+        import drjit as dr
+
+        if self.name == "cuda":
+            return array_type(values)
+        owned = dr.empty(array_type, len(values))
+        owned.numpy()[:] = values  # a view
+        return owned
+
+
 _chosen: str | None = None
 _active: Backend | None = None
 

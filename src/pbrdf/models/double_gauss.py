@@ -102,7 +102,8 @@ class DoubleGauss(Model):
     shadowing
         ``"v-cavity"`` (paper eq. 4), ``"smith"`` (height-correlated) or ``"none"``.
     accuracy
-        Accuracy of the average over the facets: ``"default"`` or ``"high"`` (slow, for reference values).
+        Accuracy of the average over the facets: ``"default"``, ``"high"`` (slow, for reference values) or
+        ``"draft"`` (for searching).
 
     Every parameter may be an array (a map of paints) that broadcasts against the angles.
 

@@ -215,16 +215,17 @@ def _evaluate_numpy(
     flat = {k: (a.item() if a.size == 1 else np.broadcast_to(a, grid).ravel()) for k, a in arrays.items()}
     backend = get_backend()
     width = math.prod(shape)
-    result = np.empty((total, width))
+    pieces = []
     dielectric = not np.any(arrays["kappa"])
     for start in range(0, total, CHUNK):
         stop = min(start + CHUNK, total)
         piece = {k: (v if isinstance(v, float) else v[start:stop]) for k, v in flat.items()}
-        inputs = {k: backend.Float(v) for k, v in piece.items() if not isinstance(v, float)}
-        out = dr.zeros(backend.Float, (stop - start) * width)
+        inputs = {k: backend.upload(backend.Float, v) for k, v in piece.items() if not isinstance(v, float)}
+        out = dr.empty(backend.Float, (stop - start) * width)
         for lanes in _lane_groups(piece, stop - start, model, part):
             _launch(model, backend, piece, inputs, lanes, stop - start, dielectric, part, function, out)
-        result[start:stop] = out.numpy().reshape(-1, width)
+        pieces.append(out.numpy())
+    result = pieces[0] if len(pieces) == 1 else np.concatenate(pieces or [np.empty(0)])
     return result.reshape(*grid, *shape)
 
 
@@ -233,7 +234,7 @@ def _lane_groups(piece: dict[str, Any], size: int, model: Model, part: str) -> l
 
     None stands for all directions in their order.
     """
-    if part == "specular" or model.chosen["accuracy"] != "default":
+    if part == "specular" or model.chosen["accuracy"] == "high":
         return [None]
     sigma = np.asarray(piece["sigma"])
     theta = np.maximum(piece["theta_i"], piece["theta_r"])
@@ -260,7 +261,7 @@ def _launch(
     import drjit as dr
 
     Float, UInt32 = backend.Float, backend.UInt32
-    index = dr.arange(UInt32, size) if lanes is None else UInt32(lanes)
+    index = dr.arange(UInt32, size) if lanes is None else backend.upload(UInt32, lanes)
 
     def fetch(name: str) -> Any:
         # scalars are opaque, so that a new value does not mean a new kernel
@@ -270,10 +271,8 @@ def _launch(
     if dielectric:
         values["kappa"] = None
     f = kernel_from_angles(model, fetch("theta_i"), fetch("theta_r"), fetch("phi"), values, part)
-    outputs = function(f)
-    for j, value in enumerate(outputs):
-        if not _is_zero(value):
-            dr.scatter(out, value, index * len(outputs) + j)
+    # one packet scatter: several scatters into the same array would each be a kernel of its own
+    dr.scatter(out, backend.module.ArrayXf64([Float(x) for x in function(f)]), index)
     dr.eval(out)
 
 
@@ -348,16 +347,7 @@ def _evaluate_drjit(
             return Matrix([[outputs[4 * i + j] for j in range(4)] for i in range(4)])
         return getattr(module, f"Array4f{suffix}")(outputs)
     Tensor = dr.tensor_t(Float)
-    return Tensor(dr.ravel(_interleave(outputs), order="F"), (*grid, *shape))
-
-
-def _interleave(outputs: list[Any]) -> Any:
-    import drjit as dr
-
-    Float = type(outputs[0])
-    size = max(dr.width(x) for x in outputs)
+    size = math.prod(grid)
     flat = dr.zeros(Float, size * len(outputs))
-    index = dr.arange(dr.uint32_array_t(Float), size) * len(outputs)
-    for j, value in enumerate(outputs):
-        dr.scatter(flat, value, index + j)
-    return flat
+    dr.scatter(flat, get_backend().module.ArrayXf64(outputs), dr.arange(dr.uint32_array_t(Float), size))
+    return Tensor(flat, (*grid, *shape))

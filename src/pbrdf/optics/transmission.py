@@ -108,8 +108,12 @@ def _tanh_sinh(step: float, half: int) -> tuple[list[float], list[float]]:
     return points, weights
 
 
-_VISIBLE_RULES = {"default": _tanh_sinh(0.22, 14), "high": _tanh_sinh(0.1, 33)}
-_SERIES_TERMS = {"default": 20, "high": 32}
+_VISIBLE_RULES = {
+    "default": _tanh_sinh(0.22, 14),
+    "high": _tanh_sinh(0.1, 33),
+    "draft": _tanh_sinh(0.35, 8),
+}
+_SERIES_TERMS = {"default": 20, "high": 32, "draft": 10}
 
 
 def visible_means(geometry: Geometry, k: Any, accuracy: str = "default") -> tuple[Any, Any]:

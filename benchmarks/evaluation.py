@@ -1,0 +1,271 @@
+"""Speed of full-Mueller evaluation: pbrdf against NumPy and C++ with the same quadrature.
+
+    python benchmarks/evaluation.py [--count N] [--repeat R] [--quick] [--json FILE]
+
+Measured is the time for the 4 x 4 Mueller matrices (float64, in and out as NumPy arrays) of random out-of-plane
+geometries, in three cases. pbrdf is timed warm, that is with the kernel compiled; the first call is reported apart.
+The peers, ``benchmarks/peers/``, are a vectorised, cache-blocked NumPy implementation in one process and a
+straightforward C++ program (plain loops, ``g++ -O3 -march=native -ffast-math -fopenmp``) on as many threads as
+pbrdf uses; they are written from the equations, apart from pbrdf's code, and use the same quadrature. All three
+must agree to 1e-9 of f00, else the script ends with status 1.
+
+Times are minima over interleaved repeats. They depend on the machine (vector units, cores, memory) and on what
+else it is doing; only ratios out of one and the same run mean anything, and these too differ between machines.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ctypes
+import json
+import math
+import os
+import platform
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from shutil import which
+from typing import Any
+
+import numpy as np
+from peers import double_gauss_numpy as numpy_peer
+from rich.console import Console
+from rich.table import Table
+
+import pbrdf  # noqa: F401  (points Dr.Jit to its LLVM, so it comes before anything that imports Dr.Jit)
+from pbrdf.backend import get_backend, llvm_version, thread_count
+from pbrdf.models.double_gauss import DoubleGauss
+from pbrdf.optics import quadrature
+
+HERE = Path(__file__).resolve().parent
+TOLERANCE = 1e-9
+FLAGS = ["-O3", "-march=native", "-ffast-math", "-fopenmp", "-std=c++17", "-shared", "-fPIC"]
+#: Matte white, thick, of the paper's Table 1.
+PAINT = numpy_peer.Paint(sigma=0.0398, n=1.6207, a=1.5174, k=1.2504, b=0.1827, t=0.6717)
+
+Function = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
+
+
+@dataclass(frozen=True)
+class Case:
+    """One measurement: the paint's slope deviation, and the largest zenith angle in radians.
+
+    ``aims`` are the ratios aimed at, by peer.
+    """
+
+    name: str
+    sigma: float
+    largest: float
+    aims: dict[str, float] = field(default_factory=dict)
+
+
+CASES = (
+    Case("matte white paint, to 1.3 rad", PAINT.sigma, 1.3, {"NumPy": 30.0, "C++": 7.0}),
+    Case("σ = 0.1, to 1.3 rad", 0.1, 1.3),
+    Case("matte white paint, to 85°", PAINT.sigma, math.radians(85.0)),
+)
+
+
+class Parameters(ctypes.Structure):
+    """``Paint`` of the C++ program."""
+
+    _fields_ = [(name, ctypes.c_double) for name in numpy_peer.Paint._fields]  # noqa: RUF012
+
+
+class RuleStructure(ctypes.Structure):
+    """``Rule`` of the C++ program."""
+
+    _fields_ = [  # noqa: RUF012
+        *((name, ctypes.c_double) for name in ("clear_wedge", "sigma_12", "sigma_25", "step", "steepness")),
+        ("half", ctypes.c_int64),
+    ]
+
+
+def default_rule() -> numpy_peer.Rule:
+    """Quadrature of pbrdf's default accuracy, for the peers."""
+    wedge = quadrature.ACCURACIES["default"]
+    return numpy_peer.Rule(
+        quadrature.CLEAR_WEDGE,
+        quadrature.SIGMA_12,
+        quadrature.SIGMA_25,
+        wedge.step,
+        wedge.steepness,
+        wedge.half,
+    )
+
+
+def compile_peer() -> tuple[Any, str]:
+    """Compile and load the C++ program; returns it, or None, and a line about the compiler."""
+    compiler = which("g++")
+    if compiler is None:
+        return None, "no g++ on this machine, C++ left out"
+    library = HERE / "build" / "libdouble_gauss.so"
+    library.parent.mkdir(exist_ok=True)
+    command = [compiler, *FLAGS, str(HERE / "peers" / "double_gauss.cpp"), "-o", str(library)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        return None, f"g++ failed, C++ left out: {done.stderr.strip().splitlines()[-1:]}"
+    version = subprocess.run([compiler, "-dumpfullversion"], capture_output=True, text=True, check=False)
+    function = ctypes.CDLL(str(library)).double_gauss_mueller
+    function.restype = None
+    return function, f"g++ {version.stdout.strip()} {' '.join(FLAGS[:4])}"
+
+
+def cpp_function(library: Any, paint: numpy_peer.Paint, rule: numpy_peer.Rule, threads: int) -> Function:
+    """Wrap the C++ program for one paint."""
+    parameters, rules = Parameters(*paint), RuleStructure(*rule)
+
+    def pointer(array: np.ndarray) -> Any:
+        return array.ctypes.data_as(ctypes.c_void_p)
+
+    def function(theta_i: np.ndarray, theta_r: np.ndarray, phi: np.ndarray) -> np.ndarray:
+        result = np.empty((theta_i.size, 4, 4))
+        library(
+            ctypes.c_int64(theta_i.size),
+            *(pointer(angle) for angle in (theta_i, theta_r, phi)),
+            ctypes.byref(parameters),
+            ctypes.byref(rules),
+            ctypes.c_int(threads),
+            pointer(result),
+        )
+        return result
+
+    return function
+
+
+def timed(function: Function, angles: tuple[np.ndarray, ...]) -> tuple[float, np.ndarray]:
+    """Time one call in seconds."""
+    start = time.perf_counter()
+    result = function(*angles)
+    return time.perf_counter() - start, result
+
+
+def random_geometries(count: int, largest: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Zenith angles uniform to ``largest``, azimuths uniform around; always the same ones."""
+    random = np.random.default_rng(20170711)
+    theta_i, theta_r = random.uniform(0.0, largest, (2, count))
+    return theta_i, theta_r, random.uniform(0.0, 2.0 * math.pi, count)
+
+
+def measure(case: Case, count: int, repeat: int, library: Any, threads: int) -> dict[str, Any]:
+    """Run one case: check that the implementations agree, then time them in turn."""
+    rule = default_rule()
+    paint = PAINT._replace(sigma=case.sigma)
+    model = DoubleGauss(**paint._asdict())
+    functions: dict[str, Function] = {
+        "pbrdf": model.mueller,
+        "NumPy": lambda *angles: numpy_peer.mueller(*angles, paint, rule),
+    }
+    if library is not None:
+        functions["C++"] = cpp_function(library, paint, rule, threads)
+    angles = random_geometries(count, case.largest)
+
+    cold, reference = timed(model.mueller, angles)
+    difference = {}
+    for name, function in functions.items():
+        if name != "pbrdf":
+            relative = np.abs(function(*angles) - reference).max(axis=(1, 2)) / reference[:, 0, 0]
+            difference[name] = float(relative.max())
+    del reference, relative
+
+    seconds: dict[str, list[float]] = {name: [] for name in functions}
+    for _ in range(repeat):
+        for name, function in functions.items():
+            # the fast ones run several times in a row: the first call after another implementation finds cold caches
+            for _ in range(1 if name == "NumPy" else 3):
+                seconds[name].append(timed(function, angles)[0])
+    best = {name: min(values) for name, values in seconds.items()}
+    farther = np.maximum(angles[0], angles[1])
+    return {
+        "case": case.name,
+        "sigma": case.sigma,
+        "largest_zenith_rad": case.largest,
+        "count": count,
+        "wedge_share": float(np.mean(1.0 / np.tan(farther) <= rule.clear_wedge * case.sigma)),
+        "cold_s": cold,
+        "best_s": best,
+        "median_s": {name: float(np.median(values)) for name, values in seconds.items()},
+        "ratio": {name: best[name] / best["pbrdf"] for name in functions if name != "pbrdf"},
+        "aim": case.aims,
+        "difference": difference,
+        "agree": all(value <= TOLERANCE for value in difference.values()),
+    }
+
+
+def processor() -> str:
+    """Name of the processor, as far as the system tells."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        return platform.processor() or platform.machine()
+    return next((line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")), "unknown")
+
+
+def show(console: Console, results: list[dict[str, Any]]) -> None:
+    """Print the table of all cases."""
+    table = Table(title="Mueller matrices, float64; times in ms, least (median) of all repeats")
+    columns = ("implementation", "time", "per direction", "pbrdf is faster by", "aim", "max|Δ|/f00")
+    for column in columns:
+        table.add_column(column, justify="left" if column == "implementation" else "right")
+    for result in results:
+        share = f"{100.0 * result['wedge_share']:.0f} % near the edge of the lit and seen facets"
+        table.add_section()
+        table.add_row(f"[bold]{result['case']}[/bold]\n{result['count']} directions, {share}")
+        for name, best in result["best_s"].items():
+            ratio, aim = result["ratio"].get(name), result["aim"].get(name)
+            difference = result["difference"].get(name)
+            table.add_row(
+                f"  {name}",
+                f"{1e3 * best:.1f} ({1e3 * result['median_s'][name]:.1f})",
+                f"{1e9 * best / result['count']:.0f} ns",
+                "" if ratio is None else f"{ratio:.1f}x",
+                "" if aim is None else f"≥ {aim:g}x {'met' if ratio >= aim else 'missed'}",
+                "" if difference is None else f"{difference:.1e}",
+            )
+        table.add_row("  pbrdf, first call", f"{1e3 * result['cold_s']:.1f}")
+    console.print(table)
+
+
+def main() -> int:
+    """Run the benchmark; returns the exit status."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--count", type=int, default=10**6, help="directions a call (default 1000000)")
+    parser.add_argument("--repeat", type=int, default=5, help="rounds over the implementations (default 5)")
+    parser.add_argument("--quick", action="store_true", help="50000 directions, 2 rounds: a check, not a measurement")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="also write everything measured to this file")
+    options = parser.parse_args()
+    count, repeat = (50_000, 2) if options.quick else (options.count, options.repeat)
+    if count < 1 or repeat < 1:
+        parser.error("--count and --repeat must be at least 1")
+
+    console = Console()
+    backend = get_backend()
+    library, compiler = compile_peer()
+    threads = thread_count() if backend.name == "llvm" else os.cpu_count() or 1
+    version = llvm_version()
+    machine = {
+        "processor": processor(),
+        "cores": os.cpu_count(),
+        "threads": threads,
+        "backend": backend.name,
+        "llvm": ".".join(map(str, version)) if version else "unknown",
+        "numpy": np.__version__,
+        "python": platform.python_version(),
+        "compiler": compiler,
+    }
+    console.print(", ".join(f"{key} {value}" for key, value in machine.items()), highlight=False)
+    results = [measure(case, count, repeat, library, threads) for case in CASES]
+    show(console, results)
+    if options.json is not None:
+        options.json.write_text(json.dumps({"machine": machine, "tolerance": TOLERANCE, "cases": results}, indent=2) + "\n")
+    if not all(result["agree"] for result in results):
+        console.print(f"[red]The implementations differ by more than {TOLERANCE:g} of f00.[/red]")
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,129 @@
+"""What a data set is.
+
+Every measurement and every simulation in the project is one :class:`xarray.Dataset` with the single
+dimension ``geometry``: one row per pair of directions, wavelength and group. Angles are in **radians**.
+
+Coordinates along ``geometry``
+    ``theta_i``, ``theta_r``
+        Zenith angles of source and viewer, [0, π/2).
+    ``phi``
+        Relative azimuth; φ = 0 is the forward (specular) half-plane, φ = π backscatter. Any finite value
+        within one turn, |φ| ≤ 2π.
+    ``wavelength`` (optional)
+        In nm; NaN where it is not known.
+    ``group``
+        What was measured together, for example one camera position: integers, or text without line
+        breaks and surrounding white space. 0 everywhere when nothing was stated.
+
+Data variables: exactly one of three forms
+    (a) Stokes parameters of the reflected light under the stated illumination: ``I`` and any of ``Q``,
+        ``U``, ``V``;
+    (b) ``I`` with ``dolp`` (degree of linear polarisation) and, optionally, ``aolp`` (its angle, radians);
+    (c) ``mueller`` with the dimensions (``geometry``, ``stokes_out``, ``stokes_in``), whose coordinates
+        are I, Q, U, V.
+
+    Each may have a standard uncertainty of the same shape in the variable ``<name>_std``, > 0. NaN means
+    *not measured here*, and, in an uncertainty, *not known*.
+
+Attributes
+    ``quantity``
+        ``"brdf"`` (1/sr), ``"reflectance_factor"`` (π · BRDF, 1), ``"radiance"`` (arbitrary units,
+        proportional to BRDF · cos θ_i) or ``"dn"`` (the same, digital numbers of a camera). It describes
+        I, Q, U, V and the Mueller matrix.
+    ``stokes_convention``
+        Always ``"p-s"``: Q = I_p − I_s, (p, s, k) right-handed. Readers convert.
+    ``illumination``
+        Stokes vector of the source, four numbers; ``[1, 0, 0, 0]`` is natural light. It applies to forms
+        (a) and (b).
+    ``simulated``
+        1 if a model produced the numbers, else 0.
+    ``title``, ``source``, ``reference``, ``instrument`` (optional)
+        Free text.
+    ``scale`` (optional)
+        ``"arbitrary"`` where an unknown constant factor is left in the values.
+    ``assumptions`` (optional)
+        Sentences: what a reader assumed because the file did not say.
+
+Further attributes are kept if they are text, finite numbers or lists of these.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+__all__ = [
+    "ANGLES",
+    "ATTRIBUTE_NAME",
+    "COORDINATES",
+    "DIMENSION",
+    "FILE_KEYS",
+    "FORMS",
+    "NATURAL_LIGHT",
+    "QUANTITIES",
+    "STOKES",
+    "TEXT_ATTRIBUTES",
+    "UNITS",
+    "VARIABLES",
+    "spells_integer",
+    "std_name",
+    "variable_dims",
+    "variable_units",
+]
+
+DIMENSION = "geometry"
+STOKES = ("I", "Q", "U", "V")
+NATURAL_LIGHT = (1.0, 0.0, 0.0, 0.0)
+
+QUANTITIES = ("brdf", "reflectance_factor", "radiance", "dn")
+COORDINATES = ("theta_i", "theta_r", "phi", "wavelength", "group")
+VARIABLES = ("I", "Q", "U", "V", "dolp", "aolp", "mueller")
+
+#: The three forms of a data set: the variable that makes the form, and those that may stand beside it.
+FORMS = (("I", ("Q", "U", "V")), ("dolp", ("I", "aolp")), ("mueller", ()))
+
+#: Variables in radians; files hold them in degrees.
+ANGLES = ("theta_i", "theta_r", "phi", "aolp", "aolp_std")
+
+TEXT_ATTRIBUTES = ("title", "source", "reference", "instrument")
+
+#: Header keys by which a CSV file states its own conventions; no attribute may have these names.
+FILE_KEYS = ("azimuth", "stokes", "cosine_weighted", "angles")
+
+#: What an attribute may be called, so that every file format can hold it.
+ATTRIBUTE_NAME = r"[A-Za-z_][A-Za-z0-9_.-]*"
+
+UNITS = {"brdf": "1/sr", "reflectance_factor": "1", "radiance": "arbitrary", "dn": "1"}
+
+
+def std_name(variable: str) -> str:
+    """Name of the variable that holds the standard uncertainty of `variable`."""
+    return f"{variable}_std"
+
+
+def variable_dims(variable: str) -> tuple[str, ...]:
+    """Dimensions of a data variable or of its uncertainty."""
+    if variable in ("mueller", "mueller_std"):
+        return (DIMENSION, "stokes_out", "stokes_in")
+    return (DIMENSION,)
+
+
+def variable_units(variable: str, quantity: str) -> str:
+    """Content of the attribute ``units``; empty if there is no unit to name."""
+    base = variable.removesuffix("_std")
+    if variable in ANGLES:
+        return "rad"
+    if base == "wavelength":
+        return "nm"
+    if base == "dolp":
+        return "1"
+    if base == "group":
+        return ""
+    return UNITS.get(quantity, "")
+
+
+def spells_integer(label: str) -> bool:
+    """Whether a group label reads back from text as an integer."""
+    try:
+        return str(int(label)) == label and np.iinfo(np.int64).min <= int(label) <= np.iinfo(np.int64).max
+    except ValueError:
+        return False

@@ -1,0 +1,437 @@
+"""Judging a data set against the schema.
+
+:func:`check` returns what it finds as :class:`Issue` objects, errors and warnings; :func:`validate` raises
+if there is an error. An error means that the numbers cannot be used as they stand (a viewer below the
+horizon, a missing variable); a warning means that they can, but that a measurement should not look like
+this (a degree of polarisation above 1, a negative intensity).
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from pbrdf.data.schema import (
+    ATTRIBUTE_NAME,
+    COORDINATES,
+    DIMENSION,
+    FILE_KEYS,
+    FORMS,
+    QUANTITIES,
+    STOKES,
+    TEXT_ATTRIBUTES,
+    VARIABLES,
+    spells_integer,
+    std_name,
+    variable_dims,
+)
+from pbrdf.errors import DataError
+
+__all__ = ["Issue", "check", "validate"]
+
+#: How many standard uncertainties an unphysical value may stray before it is reported.
+TOLERATED_DEVIATIONS = 5.0
+
+_ROWS_NAMED = 5
+_LOWER_CASE_ATTRIBUTES = frozenset(
+    ("quantity", "stokes_convention", "illumination", "simulated", *TEXT_ATTRIBUTES, *FILE_KEYS)
+)
+
+
+@dataclass(frozen=True)
+class Issue:
+    """One thing wrong, or suspicious, in a data set.
+
+    Attributes
+    ----------
+    severity
+        ``"error"`` or ``"warning"``.
+    variable
+        The variable or attribute it concerns; empty if it concerns the whole data set.
+    message
+        One sentence: where, what value, and what to do.
+    rows
+        Indices (from 0) along ``geometry`` of all rows concerned; empty if it is not about rows.
+    """
+
+    severity: Literal["error", "warning"]
+    variable: str
+    message: str
+    rows: tuple[int, ...] = ()
+
+    def __str__(self) -> str:
+        return self.message
+
+
+@dataclass(frozen=True)
+class _Labels:
+    """How messages name rows and variables: as the file does, if there is one."""
+
+    lines: Sequence[int] | None
+    columns: Mapping[str, str]
+
+    def rows(self, rows: NDArray[np.intp]) -> str:
+        # One line of a file may hold several rows, for example one per wavelength.
+        names = list(dict.fromkeys(int(row) if self.lines is None else self.lines[row] for row in rows))
+        kind = "row" if self.lines is None else "line"
+        more = f" and {len(names) - _ROWS_NAMED} more" if len(names) > _ROWS_NAMED else ""
+        return f"{kind}{'s' if len(names) > 1 else ''} {', '.join(map(str, names[:_ROWS_NAMED]))}{more}"
+
+    def variable(self, name: str) -> str:
+        return f"{name} (column {self.columns[name]!r})" if name in self.columns else name
+
+
+def check(
+    ds: xr.Dataset, *, lines: Sequence[int] | None = None, columns: Mapping[str, str] | None = None
+) -> list[Issue]:
+    """Everything in `ds` that breaks the schema or that a measurement should not show.
+
+    Parameters
+    ----------
+    ds
+        The data set.
+    lines
+        Number of the file's line that each row came from, for messages; None names rows by their index
+        along ``geometry``, from 0.
+    columns
+        The file's column names by variable, for messages.
+
+    Returns
+    -------
+    list of Issue
+        Errors first; empty if there is nothing to say.
+    """
+    labels = _Labels(lines, columns or {})
+    issues = [*_attributes(ds), *_structure(ds)]
+    # Values can only be judged where the arrays have the right shape and type.
+    if not any(issue.severity == "error" for issue in issues):
+        issues += [*_angles(ds, labels), *_groups(ds, labels), *_values(ds, labels), *_physics(ds, labels)]
+    return sorted(issues, key=lambda issue: issue.severity != "error")
+
+
+def validate(
+    ds: xr.Dataset,
+    *,
+    origin: str = "the data set",
+    lines: Sequence[int] | None = None,
+    columns: Mapping[str, str] | None = None,
+) -> None:
+    """Raise if `ds` breaks the schema; warnings of :func:`check` pass.
+
+    Parameters
+    ----------
+    ds
+        The data set.
+    origin
+        What the message calls it, for example a file name.
+    lines, columns
+        As for :func:`check`.
+
+    Raises
+    ------
+    DataError
+        Lists every error, one per line.
+    """
+    errors = [issue for issue in check(ds, lines=lines, columns=columns) if issue.severity == "error"]
+    if errors:
+        raise DataError("\n  ".join([f"{origin} does not follow the schema:", *map(str, errors)]))
+
+
+def _error(variable: str, message: str, rows: NDArray[np.intp] | None = None) -> Issue:
+    return Issue("error", variable, message, () if rows is None else tuple(rows.tolist()))
+
+
+def _warning(variable: str, message: str, rows: NDArray[np.intp] | None = None) -> Issue:
+    return Issue("warning", variable, message, () if rows is None else tuple(rows.tolist()))
+
+
+def _attributes(ds: xr.Dataset) -> Iterator[Issue]:
+    attrs = ds.attrs
+    if attrs.get("quantity") not in QUANTITIES:
+        yield _error(
+            "quantity",
+            f"the attribute quantity is {attrs.get('quantity')!r}; use one of {', '.join(QUANTITIES)}",
+        )
+    if attrs.get("stokes_convention") != "p-s":
+        yield _error(
+            "stokes_convention",
+            f"the attribute stokes_convention is {attrs.get('stokes_convention')!r} but must be 'p-s'; "
+            "convert with pbrdf.data.conventions",
+        )
+    if attrs.get("simulated") not in (0, 1):
+        yield _error("simulated", f"the attribute simulated is {attrs.get('simulated')!r}; use 0 or 1")
+    yield from _illumination(attrs.get("illumination"))
+    for name in TEXT_ATTRIBUTES:
+        if name in attrs and not isinstance(attrs[name], str):
+            yield _error(name, f"the attribute {name} is {attrs[name]!r}, not text")
+    for name, value in attrs.items():
+        if re.fullmatch(ATTRIBUTE_NAME, str(name)) is None:
+            yield _error(
+                str(name), f"the attribute name {name!r} is not made of letters, digits, '_', '.', '-'"
+            )
+        elif str(name).lower() in FILE_KEYS:
+            yield _error(
+                str(name), f"an attribute must not be called {name!r}: files state conventions there"
+            )
+        elif name != str(name).lower() and str(name).lower() in _LOWER_CASE_ATTRIBUTES:
+            yield _error(str(name), f"write the attribute {name!r} in lower case")
+        elif not _is_storable(value):
+            yield _error(
+                str(name),
+                f"the attribute {name} cannot be stored ({value!r}); use text, finite numbers or lists of "
+                "these",
+            )
+    for sentence in attrs.get("assumptions", ()):
+        yield _warning("assumptions", str(sentence))
+
+
+def _illumination(value: Any) -> Iterator[Issue]:
+    try:
+        source = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        source = np.empty(0)
+    if source.shape != (4,) or not np.all(np.isfinite(source)):
+        yield _error("illumination", f"the attribute illumination is {value!r}; give four numbers, I Q U V")
+    elif source[0] <= 0 or np.linalg.norm(source[1:]) > source[0] * (1 + 1e-9):
+        yield _error(
+            "illumination",
+            f"the illumination {value!r} is no Stokes vector: I must be positive and √(Q²+U²+V²) at most I",
+        )
+
+
+def _is_storable(value: Any) -> bool:
+    if isinstance(value, str):
+        return True
+    if isinstance(value, list | tuple):
+        return all(isinstance(item, str) for item in value) or all(_is_number(item) for item in value)
+    return _is_number(value)
+
+
+def _is_number(value: Any) -> bool:
+    if isinstance(value, int):
+        return abs(value) < 2**63  # netCDF has no larger integers
+    return isinstance(value, float) and math.isfinite(value)
+
+
+def _structure(ds: xr.Dataset) -> Iterator[Issue]:
+    if DIMENSION not in ds.sizes:
+        yield _error("", f"there is no dimension {DIMENSION!r}; build data sets with pbrdf.data.make_dataset")
+        return
+    if ds.sizes[DIMENSION] == 0:
+        yield _error("", "there are no rows")
+    for name in ("theta_i", "theta_r", "phi", "group"):
+        if name not in ds.coords:
+            yield _error(name, f"the coordinate {name} is missing")
+    known = {*COORDINATES, *VARIABLES, *map(std_name, VARIABLES), "stokes_out", "stokes_in"}
+    for name in map(str, ds.variables):
+        if name not in known:
+            yield _error(
+                name,
+                f"the schema has no variable {name!r}; drop it, or use one of "
+                f"{', '.join((*COORDINATES, *VARIABLES))}",
+            )
+        elif name in COORDINATES and name not in ds.coords:
+            yield _error(name, f"{name} must be a coordinate, not a data variable")
+    for name in map(str, ds.variables):
+        if name in ("stokes_out", "stokes_in"):
+            if ds[name].values.tolist() != list(STOKES):
+                yield _error(name, f"the coordinate {name} must be {', '.join(STOKES)} in this order")
+        elif name in known:
+            yield from _array(ds, name)
+    yield from _forms(ds)
+
+
+def _array(ds: xr.Dataset, name: str) -> Iterator[Issue]:
+    array = ds[name]
+    dims = variable_dims(name)
+    if array.dims != dims:
+        yield _error(name, f"{name} has the dimensions {array.dims}; {dims} is needed")
+    elif len(dims) == 3 and array.shape[1:] != (4, 4):
+        yield _error(name, f"{name} has the shape {array.shape}; (rows, 4, 4) is needed")
+    kinds = "iU" if name == "group" else "f"
+    if array.dtype.kind not in kinds:
+        wanted = "integers or text" if name == "group" else "floating-point numbers"
+        yield _error(name, f"{name} has the type {array.dtype}; {wanted} are needed")
+    owner = name.removesuffix("_std")
+    if owner != name and owner not in ds.data_vars:
+        yield _error(name, f"{name} is there but {owner} is not")
+
+
+def _forms(ds: xr.Dataset) -> Iterator[Issue]:
+    present = [name for name in VARIABLES if name in ds.data_vars]
+    if not any(core in present and set(present) <= {core, *beside} for core, beside in FORMS):
+        yield _error(
+            "",
+            f"the variables are {', '.join(present) or 'none'}; give I with any of Q, U, V; or I with dolp "
+            "and perhaps aolp; or mueller alone",
+        )
+    elif "dolp" in present and "I" not in present:
+        yield _error("I", "dolp needs I beside it; fill I with NaN if it was not measured")
+
+
+def _angles(ds: xr.Dataset, labels: _Labels) -> Iterator[Issue]:
+    zenith = np.concatenate([ds["theta_i"].values, ds["theta_r"].values])
+    with np.errstate(invalid="ignore"):
+        in_degrees = np.nanmax(np.abs(zenith), initial=0.0) > np.pi
+    hint = "; these look like degrees: convert with numpy.deg2rad" if in_degrees else ""
+    for name in ("theta_i", "theta_r"):
+        values = ds[name].values
+        bad = np.flatnonzero(~((values >= 0) & (values < np.pi / 2)))
+        if bad.size:
+            yield _error(
+                name,
+                f"{labels.variable(name)}, {labels.rows(bad)}: {_angle(values[bad[0]])} is not in [0°, 90°)"
+                f"{hint}",
+                bad,
+            )
+    for name, limit in (("phi", 2 * np.pi), ("aolp", np.pi)):
+        if name not in ds.variables:
+            continue
+        values = ds[name].values
+        # A little slack: strangers' files round π.
+        inside = np.abs(values) <= limit * (1 + 1e-5)
+        bad = np.flatnonzero(~(inside | (np.isnan(values) if name == "aolp" else False)))
+        if bad.size:
+            yield _error(
+                name,
+                f"{labels.variable(name)}, {labels.rows(bad)}: {_angle(values[bad[0]])} is not within "
+                f"±{math.degrees(limit):.0f}°; convert degrees with numpy.deg2rad",
+                bad,
+            )
+    if 0 < np.nanmax(np.abs(zenith), initial=0.0) <= np.deg2rad(np.pi / 2):
+        yield _warning(
+            "theta_i",
+            "all zenith angles are below 1.6°: were radians taken for degrees? Check the angle unit",
+        )
+
+
+def _angle(radians: float) -> str:
+    return f"{radians:.6g} rad ({math.degrees(radians):.6g}°)"
+
+
+def _groups(ds: xr.Dataset, labels: _Labels) -> Iterator[Issue]:
+    group = ds["group"].values
+    if group.dtype.kind == "i":
+        return
+    bad = np.flatnonzero([not label or label != label.strip() or not label.isprintable() for label in group])
+    if bad.size:
+        yield _error(
+            "group",
+            f"{labels.variable('group')}, {labels.rows(bad)}: the label {str(group[bad[0]])!r} is empty, has "
+            "white space around it or holds characters that cannot be printed",
+            bad,
+        )
+    if all(map(spells_integer, group)):
+        yield _error("group", "all group labels spell integers; store them as integers")
+
+
+def _values(ds: xr.Dataset, labels: _Labels) -> Iterator[Issue]:
+    measured = np.zeros(ds.sizes[DIMENSION], dtype=bool)
+    for name in ("wavelength", *map(str, ds.data_vars)):
+        if name not in ds.variables:
+            continue
+        values = ds[name].values.reshape(ds.sizes[DIMENSION], -1)
+        infinite = np.flatnonzero(np.any(np.isinf(values), axis=1))
+        if infinite.size:
+            yield _error(
+                name,
+                f"{labels.variable(name)}, {labels.rows(infinite)}: infinite; use NaN where nothing was "
+                "measured",
+                infinite,
+            )
+        if name in VARIABLES:
+            measured |= np.any(~np.isnan(values), axis=1)
+        else:
+            bad = np.flatnonzero(np.any(values <= 0, axis=1))
+            if bad.size:
+                what = "a wavelength" if name == "wavelength" else "a standard uncertainty"
+                value = np.nanmin(values[bad[0]])
+                yield _error(
+                    name,
+                    f"{labels.variable(name)}, {labels.rows(bad)}: {what} must be positive, not {value:.6g}; "
+                    "use NaN if it is not known",
+                    bad,
+                )
+    empty = np.flatnonzero(~measured)
+    if empty.size:
+        yield _warning("", f"{labels.rows(empty)}: nothing was measured there; drop the row", empty)
+
+
+def _physics(ds: xr.Dataset, labels: _Labels) -> Iterator[Issue]:
+    mueller = "mueller" in ds
+    name = "mueller" if mueller else "I"
+    intensity = ds["mueller"].values[:, 0, 0] if mueller else ds["I"].values
+    dark = np.flatnonzero(intensity <= 0)
+    if dark.size:
+        yield _warning(
+            name,
+            f"{labels.variable(name)}, {labels.rows(dark)}: {'m00' if mueller else 'I'} = "
+            f"{intensity[dark[0]]:.6g} is not positive",
+            dark,
+        )
+    if "dolp" in ds:
+        degree = ds["dolp"].values
+        bad = np.flatnonzero((degree > 1) | (degree < 0))
+        if bad.size:
+            yield _warning(
+                "dolp",
+                f"{labels.variable('dolp')}, {labels.rows(bad)}: {degree[bad[0]]:.6g} is not in [0, 1]",
+                bad,
+            )
+        return
+    # Values of any size may meet here; what overflows or divides by zero compares as not excessive.
+    with np.errstate(all="ignore"):
+        ratio, deviation = _largest_element(ds) if mueller else _degree_of_polarization(ds)
+        bad = np.flatnonzero((ratio - TOLERATED_DEVIATIONS * deviation > 1) & (intensity > 0))
+    if bad.size:
+        what = "largest |m_ij|/m00" if mueller else "degree of polarisation"
+        yield _warning(
+            name,
+            f"{labels.variable(name)}, {labels.rows(bad)}: the {what} = {ratio[bad[0]]:.6g} exceeds 1 by "
+            f"more than {TOLERATED_DEVIATIONS:g} standard uncertainties",
+            bad,
+        )
+
+
+def _degree_of_polarization(ds: xr.Dataset) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """DoP from what was measured, a lower bound if a channel is missing, and its standard uncertainty."""
+    polarized = np.stack([_or_zero(ds, name) for name in ("Q", "U", "V")])
+    deviations = np.stack([_or_zero(ds, std_name(name)) for name in ("Q", "U", "V")])
+    length = np.linalg.norm(polarized, axis=0)
+    along = np.linalg.norm(polarized * deviations, axis=0) / length
+    return _ratio(length, along, ds["I"].values, _or_zero(ds, "I_std"))
+
+
+def _largest_element(ds: xr.Dataset) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Largest |m_ij|/m00 of each row and its standard uncertainty."""
+    elements = np.abs(_or_zero(ds, "mueller")).reshape(-1, 16)
+    deviations = _or_zero(ds, "mueller_std").reshape(-1, 16)
+    rows = np.arange(len(elements))
+    largest = 1 + np.argmax(elements[:, 1:], axis=1)
+    return _ratio(elements[rows, largest], deviations[rows, largest], elements[:, 0], deviations[:, 0])
+
+
+def _ratio(
+    part: NDArray[np.float64],
+    part_std: NDArray[np.float64],
+    whole: NDArray[np.float64],
+    whole_std: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """A ratio and its standard uncertainty, to first order."""
+    ratio = part / whole
+    return ratio, np.hypot(part_std, ratio * whole_std) / np.abs(whole)
+
+
+def _or_zero(ds: xr.Dataset, name: str) -> NDArray[np.float64]:
+    """Values of a variable, 0 where it is missing or NaN."""
+    if name in ds.data_vars:
+        return np.nan_to_num(ds[name].values, nan=0.0)
+    like = ds["mueller"] if name.startswith("mueller") else ds["I"]
+    return np.zeros(like.shape)

@@ -1,0 +1,159 @@
+"""Data left out of a fit, and how well the fit predicts them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pbrdf.errors import FitError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["HoldOut", "Prediction", "prediction_errors"]
+
+_KINDS = ("group", "theta_i", "theta_r", "wavelength", "fraction")
+
+
+@dataclass(frozen=True)
+class HoldOut:
+    """Which geometries to leave out of a fit.
+
+    Attributes
+    ----------
+    kind
+        ``"group"``, ``"theta_i"``, ``"theta_r"`` (degrees), ``"wavelength"`` (nm) or ``"fraction"``.
+    values
+        The values held out; for ``"fraction"`` one number between 0 and 1.
+    """
+
+    kind: str
+    values: tuple[str, ...]
+
+    @classmethod
+    def parse(cls, text: str) -> HoldOut:
+        """Read ``KIND=VALUE[,VALUE…]``, for example ``group=3``, ``theta_i=50`` or ``fraction=0.2``.
+
+        Raises
+        ------
+        FitError
+            If the text has another form.
+        """
+        kind, sign, rest = text.partition("=")
+        values = tuple(v.strip() for v in rest.split(",") if v.strip())
+        if kind.strip() not in _KINDS or not sign or not values:
+            raise FitError(
+                f"hold-out {text!r}: give KIND=VALUE with KIND one of {', '.join(_KINDS)}, for example group=3"
+            )
+        return cls(kind.strip(), values)
+
+    def mask(self, ds: xr.Dataset, seed: int = 0) -> np.ndarray:
+        """Which geometries of a data set are held out, shape (G,).
+
+        Parameters
+        ----------
+        ds
+            The data set.
+        seed
+            Seed of the choice for ``"fraction"``.
+
+        Raises
+        ------
+        FitError
+            If nothing or everything would be held out.
+        """
+        size = ds.sizes["geometry"]
+        if self.kind == "fraction":
+            mask = self._fraction(size, seed)
+        elif self.kind == "group":
+            labels = ds["group"].values
+            mask = np.isin([str(v) for v in labels], self.values)
+            self._require(mask, "groups", sorted({str(v) for v in labels}))
+        else:
+            if self.kind not in ds.coords:
+                raise FitError(f"hold-out {self}: the data set has no {self.kind}")
+            wavelengths = self.kind == "wavelength"
+            column = ds[self.kind].values if wavelengths else np.rad2deg(ds[self.kind].values)
+            wanted = np.array([self._number(v) for v in self.values])
+            tolerance = 0.5 if wavelengths else 0.05
+            mask = (np.abs(column[:, None] - wanted) <= tolerance).any(axis=1)
+            self._require(mask, f"values of {self.kind}", [f"{v:g}" for v in np.unique(np.round(column, 2))])
+        if mask.all():
+            raise FitError(f"hold-out {self}: nothing is left to fit")
+        return mask
+
+    def _fraction(self, size: int, seed: int) -> np.ndarray:
+        share = self._number(self.values[0])
+        if len(self.values) > 1 or not 0.0 < share < 1.0:
+            raise FitError(f"hold-out {self}: give one fraction between 0 and 1")
+        count = min(max(1, round(share * size)), size)
+        mask = np.zeros(size, dtype=bool)
+        mask[np.random.default_rng(seed).choice(size, count, replace=False)] = True
+        return mask
+
+    def _number(self, text: str) -> float:
+        try:
+            return float(text)
+        except ValueError:
+            raise FitError(f"hold-out {self}: {text!r} is not a number") from None
+
+    def _require(self, mask: np.ndarray, what: str, available: list[str]) -> None:
+        if not mask.any():
+            shown = ", ".join(available[:20]) + (" …" if len(available) > 20 else "")
+            raise FitError(f"hold-out {self}: no such data; the {what} are {shown}")
+
+    def __str__(self) -> str:
+        return f"{self.kind}={','.join(self.values)}"
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Errors of predicted values, model − measured, over some geometries.
+
+    Attributes
+    ----------
+    count
+        Number of geometries.
+    intensity_rms, intensity_median, intensity_max
+        Root mean square, median of the size, and largest size of the relative error of the intensity, 1.
+    dolp_rms, dolp_max
+        Root mean square and largest size of the error of the degree of linear polarisation, 1; NaN where no
+        polarisation was measured.
+    """
+
+    count: int
+    intensity_rms: float
+    intensity_median: float
+    intensity_max: float
+    dolp_rms: float
+    dolp_max: float
+
+
+def prediction_errors(comparison: xr.Dataset, where: np.ndarray) -> Prediction:
+    """Errors over the geometries of a mask, from the comparison that a fit returns."""
+    nan = float("nan")
+
+    def errors(channel: str, relative: bool) -> np.ndarray:
+        if f"{channel}_measured" not in comparison:
+            return np.empty(0)
+        measured = comparison[f"{channel}_measured"].values[where]
+        error = comparison[f"{channel}_modelled"].values[where] - measured
+        if relative:
+            error = error[measured > 0.0] / measured[measured > 0.0]
+        return error[np.isfinite(error)]
+
+    intensity, dolp = errors("I", relative=True), errors("dolp", relative=False)
+
+    def rms(x: np.ndarray) -> float:
+        return float(np.sqrt((x**2).mean())) if x.size else nan
+
+    return Prediction(
+        count=int(where.sum()),
+        intensity_rms=rms(intensity),
+        intensity_median=float(np.median(np.abs(intensity))) if intensity.size else nan,
+        intensity_max=float(np.abs(intensity).max()) if intensity.size else nan,
+        dolp_rms=rms(dolp),
+        dolp_max=float(np.abs(dolp).max()) if dolp.size else nan,
+    )

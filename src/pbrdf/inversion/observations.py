@@ -1,0 +1,161 @@
+"""A data set as the fit sees it: geometries, channels, values and weights as plain arrays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pbrdf.data.conventions import qu_from_dolp_aolp
+from pbrdf.data.select import measured_channels, to_brdf_scale
+from pbrdf.errors import FitError
+from pbrdf.inversion.noise import NoiseModel
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["Observations"]
+
+_STOKES = ("I", "Q", "U", "V")
+
+
+@dataclass(frozen=True)
+class Observations:
+    """Measured values on the scale of a BRDF and their standard uncertainties.
+
+    Attributes
+    ----------
+    theta_i, theta_r, phi
+        Angles in radians, shape (G,).
+    channels
+        What is compared: ``I``, ``Q``, ``U``, ``V`` (radiance per unit irradiance of the stated illumination),
+        ``dolp``, or Mueller elements ``m00`` … ``m33``.
+    values, std
+        Shape (C, G). Not measured: ``values`` 0 and ``std`` infinite.
+    illumination
+        Stokes vector of the source.
+    std_known
+        Whether every standard uncertainty comes from the data set; if not, their scale is a guess.
+    """
+
+    theta_i: np.ndarray
+    theta_r: np.ndarray
+    phi: np.ndarray
+    channels: tuple[str, ...]
+    values: np.ndarray
+    std: np.ndarray
+    illumination: tuple[float, float, float, float]
+    std_known: bool
+
+    @classmethod
+    def from_dataset(cls, ds: xr.Dataset, noise: NoiseModel | None = None) -> Observations:
+        """Take what was measured from a valid data set.
+
+        DoLP with AoLP becomes Q and U (their uncertainties propagated); DoLP alone is compared as it is.
+        Uncertainties of the data set are used where given unless ``noise`` states others.
+
+        Parameters
+        ----------
+        ds
+            Data set of the project's schema, see :mod:`pbrdf.data.schema`.
+        noise
+            Stated noise; None takes the data set's uncertainties and :class:`NoiseModel` where there are none.
+
+        Raises
+        ------
+        FitError
+            If nothing was measured.
+        """
+        ds = to_brdf_scale(ds)
+        measured = measured_channels(ds)
+        if not measured:
+            raise FitError("the data set holds no measured value")
+        stated = {name: _std(ds, name) for name in measured}
+        columns: dict[str, np.ndarray] = {}
+        uncertainties: dict[str, np.ndarray] = {}
+        if "mueller" in measured:
+            for i in range(4):
+                for j in range(4):
+                    name = f"m{i}{j}"
+                    columns[name] = ds["mueller"].values[:, i, j]
+                    uncertainties[name] = stated["mueller"][:, i, j]
+            intensity = columns["m00"]
+        else:
+            columns = {name: ds[name].values for name in measured if name not in ("dolp", "aolp")}
+            uncertainties = {name: stated[name] for name in columns}
+            intensity = columns.get("I", np.ones(ds.sizes["geometry"]))
+            if "dolp" in measured and "aolp" in measured:
+                dolp, aolp = ds["dolp"].values, ds["aolp"].values
+                columns["Q"], columns["U"] = qu_from_dolp_aolp(intensity, dolp, aolp)
+                uncertainties["Q"], uncertainties["U"] = _propagated(
+                    intensity, dolp, aolp, stated["I"], stated["dolp"], stated["aolp"]
+                )
+            elif "dolp" in measured:
+                columns["dolp"], uncertainties["dolp"] = ds["dolp"].values, stated["dolp"]
+        model = noise or NoiseModel()
+        known = True
+        channels = tuple(name for name in columns if np.isfinite(columns[name]).any())
+        for name in channels:
+            guess = model.standard_uncertainty(name, intensity)
+            given = np.isfinite(uncertainties[name]) & (noise is None)
+            finite = np.isfinite(columns[name])
+            known &= bool((given | ~finite).all())
+            uncertainties[name] = np.where(given, uncertainties[name], guess)
+        values = np.stack([columns[name] for name in channels])
+        std = np.stack([uncertainties[name] for name in channels])
+        absent = ~(np.isfinite(values) & np.isfinite(std))
+        return cls(
+            theta_i=ds["theta_i"].values,
+            theta_r=ds["theta_r"].values,
+            phi=ds["phi"].values,
+            channels=channels,
+            values=np.where(absent, 0.0, values),
+            std=np.where(absent, np.inf, std),
+            illumination=tuple(float(v) for v in ds.attrs["illumination"]),  # type: ignore[arg-type]
+            std_known=known,
+        )
+
+    @property
+    def weights(self) -> np.ndarray:
+        """1/std, 0 where nothing was measured; shape (C, G)."""
+        return 1.0 / self.std
+
+    @property
+    def count(self) -> int:
+        """Number of measured values."""
+        return int(np.isfinite(self.std).sum())
+
+    @property
+    def polarised(self) -> bool:
+        """Whether any channel carries polarisation."""
+        return any(name not in ("I", "m00") for name in self.channels)
+
+    def subset(self, keep: np.ndarray) -> Observations:
+        """Only some geometries; ``keep`` is a mask or an index array of shape (G,)."""
+        return Observations(
+            self.theta_i[keep],
+            self.theta_r[keep],
+            self.phi[keep],
+            self.channels,
+            self.values[:, keep],
+            self.std[:, keep],
+            self.illumination,
+            self.std_known,
+        )
+
+
+def _std(ds: xr.Dataset, name: str) -> np.ndarray:
+    if f"{name}_std" in ds.data_vars:
+        return ds[f"{name}_std"].values
+    return np.full(ds[name].shape, np.nan)
+
+
+def _propagated(
+    I: np.ndarray, dolp: np.ndarray, aolp: np.ndarray, s_I: np.ndarray, s_dolp: np.ndarray, s_aolp: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Standard uncertainties of Q = I p cos2ψ and U = I p sin2ψ from independent ones of I, p and ψ."""
+    c, s = np.cos(2.0 * aolp), np.sin(2.0 * aolp)
+    along = (dolp * s_I) ** 2 + (I * s_dolp) ** 2
+    across = (2.0 * I * dolp * s_aolp) ** 2
+    return np.sqrt(along * c * c + across * s * s), np.sqrt(along * s * s + across * c * c)

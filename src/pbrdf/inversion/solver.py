@@ -1,0 +1,425 @@
+"""Batched Levenberg-Marquardt: thousands of bounded least-squares problems at once.
+
+One lane of the computation is one problem (one start of one data set, one pixel of a map). An iteration is
+one kernel: it solves the damped normal equations of every lane, projects the step onto the bounds, evaluates
+residuals and their exact derivatives (forward mode) at the trial point inside a symbolic loop over the
+geometries, and accepts or rejects. Lanes that have converged leave the batch. The kernel is compiled once,
+whatever the number of lanes, geometries, parameter values or bounds.
+
+The method is Levenberg-Marquardt with Marquardt's scaling, the damping update of Nielsen (1999) and
+projection onto the bounds with an active set (as in Kanzow, Yamashita and Fukushima, J. Comput. Appl. Math.
+172, 375 (2004)).
+"""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+
+from pbrdf.backend import get_backend
+
+__all__ = ["Residuals", "Solution", "Status", "solve"]
+
+#: Iterations of one kernel launch, after which stopped lanes leave the batch. A batch of at most SMALL_BATCH
+#: lanes runs to its end in one launch: recording the kernel anew would take longer than idle lanes do.
+ROUNDS, SMALL_BATCH = 6, 1024
+
+
+class Status(enum.IntEnum):
+    """Why a lane stopped."""
+
+    RUNNING = 0
+    SMALL_STEP = 1
+    SMALL_REDUCTION = 2
+    ZERO_GRADIENT = 3
+    STALLED = 4
+    ITERATIONS = 5
+    NOT_FINITE = 6
+
+    @property
+    def converged(self) -> bool:
+        """Whether the lane stands at a (local) minimum."""
+        return self in (Status.SMALL_STEP, Status.SMALL_REDUCTION, Status.ZERO_GRADIENT)
+
+
+@dataclass(frozen=True)
+class Residuals:
+    """What the solver minimises: ½ Σ r² over the points of a lane.
+
+    Attributes
+    ----------
+    function
+        ``function(u, lane, point)`` returns a list of Dr.Jit floats: the weighted residuals at one point
+        for the unknowns ``u`` (a list of floats); ``lane`` and ``point`` are uint32 indices.
+    points
+        Number of points that every lane runs over.
+    """
+
+    function: Callable[[list[Any], Any, Any], Sequence[Any]]
+    points: int
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Result of :func:`solve`; B lanes, P unknowns.
+
+    Attributes
+    ----------
+    u
+        Unknowns, shape (B, P).
+    cost
+        ½ Σ r², shape (B,).
+    information
+        JᵀJ at ``u``, shape (B, P, P).
+    gradient
+        Jᵀr at ``u``, shape (B, P).
+    status
+        Values of :class:`Status`, shape (B,).
+    iterations
+        Steps tried, shape (B,).
+    """
+
+    u: np.ndarray
+    cost: np.ndarray
+    information: np.ndarray
+    gradient: np.ndarray
+    status: np.ndarray
+    iterations: np.ndarray
+
+    @property
+    def converged(self) -> np.ndarray:
+        """Mask of the lanes that stand at a minimum, shape (B,)."""
+        return np.isin(self.status, [s for s in Status if s.converged])
+
+
+def solve(
+    residuals: Residuals,
+    start: np.ndarray,
+    lower: np.ndarray,
+    upper: np.ndarray,
+    *,
+    max_iterations: int = 100,
+    tolerance: float = 1e-10,
+    progress: Callable[[int, int], None] | None = None,
+) -> Solution:
+    """Minimise ½ Σ r² for every lane within bounds.
+
+    Parameters
+    ----------
+    residuals
+        The problem.
+    start
+        Starting values, shape (B, P); moved onto the bounds where outside.
+    lower, upper
+        Bounds, shape (P,).
+    max_iterations
+        Steps tried at most.
+    tolerance
+        A lane stops when the step, in units of the range of each unknown, or the predicted relative
+        reduction of the cost over ``tolerance`` falls below ``tolerance``.
+    progress
+        Called after each iteration with the number of stopped lanes and of all lanes.
+
+    Returns
+    -------
+    Solution
+        With whatever was reached; look at ``status``.
+    """
+    import drjit as dr
+
+    backend = get_backend()
+    Float, UInt32 = backend.Float, backend.UInt32
+    batch, size = start.shape
+    # bounds are opaque, so that other bounds do not mean another kernel
+    low = [dr.opaque(Float, float(v)) for v in lower]
+    high = [dr.opaque(Float, float(v)) for v in upper]
+    result = _Result(batch, size)
+    # a batch of one would be compiled apart, as a broadcast: double it
+    lanes = np.arange(batch, dtype=np.uint32) if batch > 1 else np.zeros(2, dtype=np.uint32)
+    state = _State.initial(backend, np.clip(start, lower, upper)[lanes])
+    limit = dr.opaque(UInt32, max_iterations)
+    small = dr.opaque(Float, tolerance)
+    while len(lanes):
+        active = backend.upload(UInt32, lanes)
+        state = _iterations(residuals, state, active, low, high, small, limit)
+        status = state.status.numpy()
+        done = status != Status.RUNNING
+        if done.any():
+            result.store(lanes, np.flatnonzero(done), state, status)
+            rest = np.flatnonzero(~done).astype(np.uint32)
+            if len(rest) == 1:
+                rest = rest.repeat(2)
+            lanes = lanes[rest]
+            if len(rest):
+                state = state.gather(backend.upload(UInt32, rest))
+        if progress is not None:
+            progress(max(batch - len(lanes), 0), batch)
+    return result.solution()
+
+
+@dataclass
+class _State:
+    """Everything that an iteration hands to the next, as Dr.Jit arrays over the running lanes."""
+
+    u: list[Any]
+    cost: Any
+    A: list[Any]
+    g: list[Any]
+    damping: Any
+    growth: Any
+    status: Any
+    iterations: Any
+
+    @classmethod
+    def initial(cls, backend: Any, start: np.ndarray) -> _State:
+        # infinite cost and an identity for JᵀJ: the first "step" has length 0 and is always accepted
+        import drjit as dr
+
+        Float = backend.Float
+        batch, size = start.shape
+
+        def full(value: float) -> Any:
+            return dr.opaque(Float, value, batch)
+
+        return cls(
+            u=[backend.upload(Float, start[:, i]) for i in range(size)],
+            cost=full(np.inf),
+            A=[full(1.0 if i == j else 0.0) for i in range(size) for j in range(i + 1)],
+            g=[full(0.0) for _ in range(size)],
+            damping=full(1e-3),
+            growth=full(2.0),
+            status=dr.opaque(backend.UInt32, 0, batch),
+            iterations=dr.opaque(backend.UInt32, 0, batch),
+        )
+
+    def gather(self, index: Any) -> _State:
+        """Only the lanes of ``index``."""
+        import drjit as dr
+
+        def take(value: Any) -> Any:
+            return [take(v) for v in value] if isinstance(value, list) else dr.gather(type(value), value, index)
+
+        state = _State(**{f.name: take(getattr(self, f.name)) for f in fields(self)})
+        dr.eval(state)
+        return state
+
+
+class _Result:
+    """Collects lanes as they stop."""
+
+    def __init__(self, batch: int, size: int) -> None:
+        self.u = np.empty((batch, size))
+        self.cost = np.empty(batch)
+        self.A = np.empty((batch, size * (size + 1) // 2))
+        self.g = np.empty((batch, size))
+        self.status = np.empty(batch, dtype=np.int64)
+        self.iterations = np.empty(batch, dtype=np.int64)
+
+    def store(self, lanes: np.ndarray, done: np.ndarray, state: _State, status: np.ndarray) -> None:
+        target = lanes[done]
+        for columns, values in ((self.u, state.u), (self.A, state.A), (self.g, state.g)):
+            for i, value in enumerate(values):
+                columns[target, i] = value.numpy()[done]
+        self.cost[target] = state.cost.numpy()[done]
+        self.status[target] = status[done]
+        self.iterations[target] = state.iterations.numpy()[done]
+
+    def solution(self) -> Solution:
+        batch, size = self.u.shape
+        information = np.empty((batch, size, size))
+        for c, (i, j) in enumerate((i, j) for i in range(size) for j in range(i + 1)):
+            information[:, i, j] = information[:, j, i] = self.A[:, c]
+        return Solution(self.u, self.cost, information, self.g, self.status, self.iterations)
+
+
+def _iterations(
+    residuals: Residuals,
+    state: _State,
+    lane: Any,
+    low: list[Any],
+    high: list[Any],
+    tolerance: Any,
+    limit: Any,
+) -> _State:
+    """Some iterations of the lanes that still run, in one kernel."""
+    import drjit as dr
+
+    UInt32 = type(lane)
+    rounds = dr.opaque(UInt32, ROUNDS if len(lane) > SMALL_BATCH else 1 << 30)
+
+    def body(count: Any, state: _State, lane: Any, *fixed: Any) -> tuple[Any, ...]:
+        return count + 1, _iterate(residuals, state, lane, *fixed), lane, *fixed
+
+    result = dr.while_loop(
+        (UInt32(0), state, lane, low, high, tolerance, limit),
+        lambda count, state, *_: (count < rounds) & (state.status == int(Status.RUNNING)),
+        body,
+        mode="symbolic",
+        label="Levenberg-Marquardt",
+    )[1]
+    dr.eval(result)
+    return result
+
+
+def _iterate(
+    residuals: Residuals,
+    state: _State,
+    lane: Any,
+    low: list[Any],
+    high: list[Any],
+    tolerance: Any,
+    limit: Any,
+) -> _State:
+    """One step of every lane."""
+    import drjit as dr
+
+    u, g, size = state.u, state.g, len(state.u)
+    A = _unpack(state.A, size)
+    # unknowns that stand on a bound and would leave through it are held
+    held = [
+        ((u[i] <= low[i]) & (g[i] > 0.0)) | ((u[i] >= high[i]) & (g[i] < 0.0)) for i in range(size)
+    ]
+    step = _damped_step(A, g, state.damping, held)
+    trial = [dr.clip(u[i] + step[i], low[i], high[i]) for i in range(size)]
+    delta = [trial[i] - u[i] for i in range(size)]
+    # −(gᵀδ + ½ δᵀAδ), the reduction that the quadratic model promises for the projected step
+    predicted = -sum(
+        delta[i] * (g[i] + 0.5 * sum(A[max(i, j)][min(i, j)] * delta[j] for j in range(size)))
+        for i in range(size)
+    )
+
+    cost, packed, gradient = _normal_equations(residuals, trial, lane)
+    first = ~dr.isfinite(state.cost)
+    finite = dr.isfinite(cost)
+    accepted = finite & ((cost < state.cost) | first)
+    gain = dr.select(first, 1.0, (state.cost - cost) / dr.maximum(predicted, 1e-300))
+    factor = dr.clip(1.0 - (2.0 * gain - 1.0) ** 3, 1.0 / 5.0, 2.0)
+    damping = dr.select(
+        accepted,
+        dr.select(first, state.damping, dr.maximum(state.damping * factor, 1e-12)),
+        state.damping * state.growth,
+    )
+    growth = dr.select(accepted, 2.0, dr.minimum(2.0 * state.growth, 64.0))
+
+    length = dr.zeros(type(cost), 1)
+    pull = dr.zeros(type(cost), 1)
+    for i in range(size):
+        span = high[i] - low[i]
+        length = dr.maximum(length, dr.abs(delta[i]) / span)
+        pull = dr.maximum(pull, dr.select(held[i], 0.0, dr.abs(g[i]) * span))
+    U = type(state.status)
+    status = dr.select(state.damping > 1e12, U(int(Status.STALLED)), U(0))
+    small = predicted < tolerance * tolerance * state.cost
+    status = dr.select(small, U(int(Status.SMALL_REDUCTION)), status)
+    status = dr.select(length < tolerance, U(int(Status.SMALL_STEP)), status)
+    status = dr.select(pull == 0.0, U(int(Status.ZERO_GRADIENT)), status)
+    status = dr.select((status == 0) & (state.iterations >= limit), U(int(Status.ITERATIONS)), status)
+    status = dr.select(first, dr.select(finite, U(0), U(int(Status.NOT_FINITE))), status)
+
+    def keep(new: list[Any], old: list[Any]) -> list[Any]:
+        return [dr.select(accepted, a, b) for a, b in zip(new, old, strict=True)]
+
+    return _State(
+        u=keep(trial, u),
+        cost=dr.select(accepted, cost, state.cost),
+        A=keep(packed, state.A),
+        g=keep(gradient, g),
+        damping=damping,
+        growth=growth,
+        status=status,
+        iterations=state.iterations + 1,
+    )
+
+
+def _normal_equations(residuals: Residuals, u: list[Any], lane: Any) -> tuple[Any, list[Any], list[Any]]:
+    """½ Σ r², the lower triangle of JᵀJ by rows, and Jᵀr, in a symbolic loop over the points."""
+    import drjit as dr
+
+    size = len(u)
+    Float = type(u[0])
+    UInt32 = type(lane)
+    points = dr.opaque(UInt32, residuals.points)
+    triangle = [(i, j) for i in range(size) for j in range(i + 1)]
+
+    def body(point: Any, u: list[Any], lane: Any, cost: Any, A: list[Any], g: list[Any]) -> tuple[Any, ...]:
+        unknown = [Float(v) for v in u]
+        dr.enable_grad(unknown)
+        r = [Float(v) for v in residuals.function(unknown, lane, point)]
+        J: list[list[Any]] = []
+        for v in unknown:
+            dr.set_grad(v, 1.0)
+            dr.enqueue(dr.ADMode.Forward, v)
+            dr.traverse(dr.ADMode.Forward, flags=dr.ADFlag.ClearInterior)
+            J.append([dr.grad(x) for x in r])
+            dr.clear_grad(r)
+            dr.clear_grad(v)
+        r = [dr.detach(x) for x in r]
+        A = [a + _inner(J[i], J[j]) for a, (i, j) in zip(A, triangle, strict=True)]
+        g = [b + _inner(J[i], r) for i, b in enumerate(g)]
+        return point + 1, u, lane, cost + 0.5 * _inner(r, r), A, g
+
+    zero = Float(0.0)
+    with dr.suspend_grad():
+        u = [dr.detach(v) for v in u]
+    out = dr.while_loop(
+        (UInt32(0), u, lane, zero, [zero] * len(triangle), [zero] * size),
+        lambda point, *_: point < points,
+        body,
+        mode="symbolic",
+        label="points",
+    )
+    return out[3], out[4], out[5]
+
+
+def _inner(a: Sequence[Any], b: Sequence[Any]) -> Any:
+    import drjit as dr
+
+    total = a[0] * b[0]
+    for x, y in zip(a[1:], b[1:], strict=True):
+        total = dr.fma(x, y, total)
+    return total
+
+
+def _unpack(packed: list[Any], size: int) -> list[list[Any]]:
+    rows, start = [], 0
+    for i in range(size):
+        rows.append(packed[start : start + i + 1])
+        start += i + 1
+    return rows
+
+
+def _damped_step(A: list[list[Any]], g: list[Any], damping: Any, held: list[Any]) -> list[Any]:
+    """Solve (A + λ diag A) δ = −g by Cholesky; held unknowns keep δ = 0."""
+    import drjit as dr
+
+    size = len(g)
+    # scale to a unit diagonal first: unknowns without influence get a unit row and no step
+    scale = [dr.select(held[i] | (A[i][i] <= 0.0), 0.0, dr.rsqrt(dr.maximum(A[i][i], 1e-300))) for i in range(size)]
+    L: list[list[Any]] = [[None] * (i + 1) for i in range(size)]
+    inverse: list[Any] = [None] * size
+    for i in range(size):
+        for j in range(i + 1):
+            value = (1.0 + damping) if i == j else A[i][j] * scale[i] * scale[j]
+            for q in range(j):
+                value = value - L[i][q] * L[j][q]
+            if i == j:
+                inverse[i] = dr.rsqrt(dr.maximum(value, 1e-14))
+            else:
+                L[i][j] = value * inverse[j]
+    y: list[Any] = []
+    for i in range(size):
+        value = -g[i] * scale[i]
+        for q in range(i):
+            value = value - L[i][q] * y[q]
+        y.append(value * inverse[i])
+    x: list[Any] = [None] * size
+    for i in reversed(range(size)):
+        value = y[i]
+        for q in range(i + 1, size):
+            value = value - L[q][i] * x[q]
+        x[i] = value * inverse[i]
+    return [x[i] * scale[i] for i in range(size)]

@@ -1,0 +1,96 @@
+"""What a fit says about its parameters: uncertainty, correlation, goodness, and what stays undetermined."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+__all__ = ["Goodness", "covariance", "goodness", "prior_spread"]
+
+
+@dataclass(frozen=True)
+class Goodness:
+    """Goodness of a fit.
+
+    Attributes
+    ----------
+    chi2
+        Σ ((model − measured)/std)².
+    data, free
+        Numbers of measured values and of free parameters.
+    reduced_chi2
+        χ²/(data − free); NaN without degrees of freedom.
+    r_squared
+        1 − Σ residual²/Σ (measured − mean)² by channel, unweighted.
+    aic, bic
+        Akaike's and the Bayesian information criterion. With known uncertainties from χ², else from
+        data·ln(χ²/data) with the scale of the uncertainties estimated.
+    """
+
+    chi2: float
+    data: int
+    free: int
+    reduced_chi2: float
+    r_squared: dict[str, float]
+    aic: float
+    bic: float
+
+
+def goodness(
+    chi2: float,
+    values: np.ndarray,
+    modelled: np.ndarray,
+    std: np.ndarray,
+    channels: tuple[str, ...],
+    free: int,
+    std_known: bool,
+) -> Goodness:
+    """Goodness of fit from measured and modelled values of shape (C, G); infinite ``std`` = not measured."""
+    measured = np.isfinite(std)
+    count = int(measured.sum())
+    freedom = count - free
+    r_squared = {}
+    for c, name in enumerate(channels):
+        y, f = values[c, measured[c]], modelled[c, measured[c]]
+        spread = float(((y - y.mean()) ** 2).sum()) if y.size else 0.0
+        r_squared[name] = 1.0 - float(((y - f) ** 2).sum()) / spread if spread > 0.0 else math.nan
+    misfit = chi2 if std_known else count * math.log(max(chi2, 1e-300) / count)
+    return Goodness(
+        chi2=chi2,
+        data=count,
+        free=free,
+        reduced_chi2=chi2 / freedom if freedom > 0 else math.nan,
+        r_squared=r_squared,
+        aic=misfit + 2.0 * free,
+        bic=misfit + math.log(count) * free,
+    )
+
+
+def covariance(information: np.ndarray, spread: np.ndarray) -> np.ndarray:
+    """Invert an information matrix JᵀJ, letting directions without information have a very large variance.
+
+    Parameters
+    ----------
+    information
+        Shape (P, P).
+    spread
+        Natural scale of each unknown, shape (P,); the matrix is scaled with it before its eigenvalues are
+        judged against rounding.
+
+    Returns
+    -------
+    ndarray
+        Shape (P, P).
+    """
+    scaled = information * np.outer(spread, spread)
+    eigenvalues, vectors = np.linalg.eigh(scaled)
+    floor = max(float(eigenvalues.max(initial=0.0)), 0.0) * 1e-15 + 1e-200
+    inverse = (vectors / np.maximum(eigenvalues, floor)) @ vectors.T
+    return inverse * np.outer(spread, spread)
+
+
+def prior_spread(lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
+    """Standard deviation of a value of which only its bounds are known: range/√12."""
+    return (upper - lower) / math.sqrt(12.0)

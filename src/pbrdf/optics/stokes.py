@@ -1,0 +1,73 @@
+"""Degree and angle of polarisation of Stokes vectors (I, Q, U, V) with Q = I_p − I_s.
+
+Each function takes a Stokes array of any kind and returns the same kind: NumPy arrays and sequences of shape
+(..., 4), xarray arrays with a dimension ``stokes_out`` (or ``stokes``), Dr.Jit ``Array4f`` values. Where I = 0 there
+is no light and the result is NaN.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+__all__ = ["aolp", "docp", "dolp", "dop"]
+
+
+def dolp(stokes: Any) -> Any:
+    """Degree of linear polarisation, √(Q² + U²)/I."""
+    intensity, q, u, _ = _components(stokes)
+    return _sqrt(q * q + u * u) / intensity
+
+
+def docp(stokes: Any) -> Any:
+    """Degree of circular polarisation, |V|/I."""
+    intensity, _, _, v = _components(stokes)
+    return abs(v) / intensity
+
+
+def dop(stokes: Any) -> Any:
+    """Degree of polarisation, √(Q² + U² + V²)/I."""
+    intensity, q, u, v = _components(stokes)
+    return _sqrt(q * q + u * u + v * v) / intensity
+
+
+def aolp(stokes: Any) -> Any:
+    """Angle of linear polarisation ½ atan2(U, Q) in radians, within (−π/2, π/2], from p towards s."""
+    _, q, u, _ = _components(stokes)
+    if _is_drjit(stokes):
+        import drjit as dr
+
+        return 0.5 * dr.atan2(u, q)
+    import numpy as np
+
+    return 0.5 * np.arctan2(u, q)
+
+
+def _is_drjit(value: Any) -> bool:
+    return type(value).__module__.startswith("drjit")
+
+
+def _components(stokes: Any) -> tuple[Any, Any, Any, Any]:
+    if _is_drjit(stokes):
+        import drjit as dr
+
+        if dr.is_tensor_v(stokes):
+            return tuple(stokes[..., i] for i in range(4))  # type: ignore[return-value]
+        return tuple(stokes[i] for i in range(4))  # type: ignore[return-value]
+    dims = getattr(stokes, "dims", ())
+    for name in ("stokes_out", "stokes"):
+        if name in dims:
+            return tuple(stokes.isel({name: i}, drop=True) for i in range(4))  # type: ignore[return-value]
+    import numpy as np
+
+    array = np.asarray(stokes, dtype=float)
+    if array.shape[-1:] != (4,):
+        raise ValueError(f"a Stokes array has four numbers in its last dimension, got the shape {array.shape}")
+    return tuple(array[..., i] for i in range(4))  # type: ignore[return-value]
+
+
+def _sqrt(value: Any) -> Any:
+    if _is_drjit(value):
+        import drjit as dr
+
+        return dr.sqrt(value)
+    return value**0.5

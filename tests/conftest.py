@@ -1,0 +1,69 @@
+"""Shared fixtures: the two computed tables, Dr.Jit arrays, and a deterministic Hypothesis profile."""
+
+from __future__ import annotations
+
+import csv
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, settings
+
+import pbrdf  # noqa: F401  before any test imports drjit: it tells Dr.Jit where LLVM is
+
+# examples are drawn the same way every time; HYPOTHESIS_PROFILE=explore draws new ones and more of them
+settings.register_profile("suite", deadline=None, derandomize=True, database=None, max_examples=15)
+settings.register_profile(
+    "explore", deadline=None, max_examples=300, suppress_health_check=[HealthCheck.too_slow]
+)
+settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "suite"))
+
+ORACLE = Path(__file__).parent / "data_oracle"
+
+
+def read_oracle(name: str) -> dict[str, np.ndarray]:
+    """Columns of a table by name; the Mueller matrices as ``M`` of shape (rows, 4, 4)."""
+    with (ORACLE / name).open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    words = ("normalization", "transmittance")
+    table = {
+        key: np.array([row[key] if key in words else float(row[key]) for row in rows]) for key in rows[0]
+    }
+    elements = [table.pop(f"f{i}{j}") for i in range(4) for j in range(4)]
+    table["M"] = np.stack(elements, -1).reshape(-1, 4, 4)
+    return table
+
+
+@pytest.fixture(scope="session")
+def scatmech_table():
+    """300 specular Mueller matrices computed with NIST SCATMECH, turned to our convention."""
+    return read_oracle("specular_scatmech.csv")
+
+
+@pytest.fixture(scope="session")
+def double_gauss_table():
+    """240 rows: 120 whole-model Mueller matrices in both readings."""
+    return read_oracle("double_gauss.csv")
+
+
+@pytest.fixture(scope="session")
+def jit():
+    """Turn numbers or arrays into the active backend's float64 Dr.Jit array."""
+    from pbrdf.backend import get_backend
+
+    Float = get_backend().Float
+    return lambda x: Float(np.atleast_1d(np.asarray(x, dtype=float)))
+
+
+@pytest.fixture(scope="session")
+def plain():
+    """Turn nested tuples and lists of Dr.Jit floats into NumPy arrays, the tuple index first."""
+
+    def convert(x, size):
+        if isinstance(x, tuple | list):
+            return np.stack([convert(v, size) for v in x])
+        x = np.asarray(x.numpy() if hasattr(x, "numpy") else x, dtype=float)
+        return np.broadcast_to(x, (size,)).copy() if x.size == 1 else x
+
+    return convert

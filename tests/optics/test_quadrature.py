@@ -1,0 +1,162 @@
+"""Averages over the lit and seen facets against independent integrals."""
+
+from __future__ import annotations
+
+import independent as ref
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from scipy.integrate import dblquad
+
+from pbrdf.optics.diffuse import minnaert_shape
+from pbrdf.optics.geometry import geometry_from_angles
+from pbrdf.optics.quadrature import facet_average, needs_wedge, wedge_distance
+
+#: θ_i, θ_r, φ in degrees, σ, k: both rays near grazing on the same and on opposite sides, rough, nearly flat
+HARD = [
+    (85, 80, 10, 0.2, 1.25),
+    (85, 80, 170, 0.2, 1.25),
+    (89.5, 60, 90, 0.3, 0.8),
+    (80, 80, 180, 0.5, 2.6),
+    (70, 75, 0, 0.6, 0.7),
+    (89.9, 89.9, 120, 0.1, 1.6),
+    (0, 85, 45, 0.3, 3.0),
+]
+IDS = ["-".join(map(str, h)) for h in HARD]
+
+
+@pytest.fixture(scope="module")
+def average(jit):
+    """(θ_i, θ_r, φ, σ, k, accuracy) → ∫P, ∫P W, ∫P W m_x, ∫P W m_x m_y over lit and seen facets, (4, N)."""
+
+    def integrand(m, mu_i, mu_r, geometry, args):
+        W = minnaert_shape(mu_i, mu_r, args[0])
+        return 1.0, W, W * m[0], W * m[0] * m[1]
+
+    def function(theta_i, theta_r, phi, sigma, k, accuracy="default"):
+        size = max(map(np.size, (theta_i, theta_r, phi, sigma, k)))
+        theta_i, theta_r, phi, sigma, k = (
+            jit(np.broadcast_to(x, (size,))) for x in (theta_i, theta_r, phi, sigma, k)
+        )
+        g = geometry_from_angles(theta_i, theta_r, phi)
+        return np.array([x.numpy() for x in facet_average(integrand, 4, g, sigma, (k,), accuracy)])
+
+    return function
+
+
+def reference(theta_i, theta_r, phi, sigma, k):
+    m, mu_i, mu_r, w = ref.slope_nodes(theta_i, theta_r, phi, sigma)
+    wW = w * ref.shape(mu_i, mu_r, k)
+    return np.array([w.sum(), wW.sum(), wW @ m[:, 0], wW @ (m[:, 0] * m[:, 1])])
+
+
+@pytest.mark.parametrize("case", HARD[:3], ids=IDS[:3])
+def test_the_reference_itself_against_dblquad(case):
+    """SciPy's adaptive dblquad in Cartesian slopes agrees with the polar tanh-sinh reference of the tests."""
+    *degrees, sigma, k = case
+    theta_i, theta_r, phi = np.radians(degrees)
+    w_i, w_r = ref.rays(theta_i, theta_r, phi)
+    c_i = 1 / np.tan(theta_i) / sigma
+
+    def density(y, x):
+        m = np.array([sigma * x, sigma * y, 1.0])
+        m /= np.sqrt(m @ m)
+        mu_i, mu_r = m @ w_i, m @ w_r
+        if mu_i <= 0 or mu_r <= 0:
+            return 0.0
+        return np.exp(-0.5 * (x * x + y * y)) / (2 * np.pi) * ref.shape(mu_i, mu_r, k)
+
+    # seen: −(x cosφ + y sinφ) < c_r, sinφ > 0, bounds y from below
+    def lowest(x):
+        return max(-8.0, min(8.0, -(1 / np.tan(theta_r) / sigma + x * np.cos(phi)) / np.sin(phi)))
+
+    found, _ = dblquad(density, -8, min(c_i, 8), lowest, 8, epsabs=1e-8, epsrel=1e-7)
+    assert found == pytest.approx(reference(theta_i, theta_r, phi, sigma, k)[1], rel=2e-6)
+
+
+def test_high_accuracy_in_hard_geometries(average):
+    """Accuracy ``high``: 1e-6 of the average in every one of the hard cases."""
+    cases = np.array(HARD)
+    angles = np.radians(cases[:, :3]).T
+    found = average(*angles, cases[:, 3], cases[:, 4], "high")
+    expected = np.array([reference(*np.radians(c[:3]), *c[3:]) for c in HARD]).T
+    np.testing.assert_allclose(found / expected[1], expected / expected[1], atol=1e-6)
+
+
+def test_default_accuracy_in_hard_geometries(average):
+    """Default accuracy: 1e-3 of the average in every one of the hard cases."""
+    cases = np.array(HARD)
+    found = average(*np.radians(cases[:, :3]).T, cases[:, 3], cases[:, 4])
+    expected = np.array([reference(*np.radians(c[:3]), *c[3:]) for c in HARD]).T
+    np.testing.assert_allclose(found / expected[1], expected / expected[1], atol=1e-3)
+
+
+@pytest.mark.parametrize(("accuracy", "tolerance"), [("high", 1e-6), ("default", 1e-3)])
+@given(arrays(float, (4, 64), elements=st.floats(0.02, 0.98)))
+def test_lit_and_seen_probability(average, accuracy, tolerance, unit):
+    """∫P over lit and seen is a bivariate normal probability, known in closed form by Owen's T function."""
+    theta_i, theta_r = np.radians(89.0) * unit[0], np.radians(89.0) * unit[1]
+    phi, sigma = np.pi * (2 * unit[2] - 1), 0.002 + 0.6 * unit[3]
+    found = average(theta_i, theta_r, phi, sigma, 1.0, accuracy)[0]
+    expected = ref.wedge_probability(1 / np.tan(theta_i) / sigma, 1 / np.tan(theta_r) / sigma, phi)
+    np.testing.assert_allclose(found, expected, atol=tolerance)
+    assert (expected > 0.2).all()  # the flat facet is always lit and seen: at least about a quarter plane
+
+
+def random_geometries(rng, size, theta_max, sigma_max):
+    return (
+        np.radians(theta_max) * rng.random(size),
+        np.radians(theta_max) * rng.random(size),
+        np.pi * (2 * rng.random(size) - 1),
+        0.002 * (sigma_max / 0.002) ** rng.random(size),
+        0.7 + 3.3 * rng.random(size),
+    )
+
+
+@pytest.mark.parametrize(
+    ("theta_max", "sigma_max", "tolerance"), [(75, 0.1, 1e-5), (83, 0.3, 1e-3)], ids=["paints", "rough"]
+)
+def test_default_agrees_with_high(average, theta_max, sigma_max, tolerance):
+    """k ≥ 0.7; E[W g]/E[W] of bounded g: ≤ 1e-5 for σ ≤ 0.1, θ ≤ 75°; ≤ 1e-3 for σ ≤ 0.3, θ ≤ 83°."""
+    case = random_geometries(np.random.default_rng(11), 4000, theta_max, sigma_max)
+    low, high = average(*case), average(*case, "high")
+    np.testing.assert_allclose(low[2:] / low[1], high[2:] / high[1], atol=tolerance)
+
+
+def test_moments_of_a_clear_wedge(average, jit):
+    """Both rays near the normal: every facet is lit and seen; slopes have mean 0 and variance σ²."""
+
+    def integrand(m, mu_i, mu_r, geometry, args):
+        x, y = m[0] / m[2], m[1] / m[2]
+        return 1.0, x, y, x * x, y * y, x * y, x * x * x * x
+
+    for sigma in (0.04, 0.1):
+        g = geometry_from_angles(jit([0.1, 0.2]), jit([0.2, 0.0]), jit([0.4, 2.0]))
+        found = [x.numpy()[0] for x in facet_average(integrand, 7, g, jit([sigma, sigma]), ())]
+        expected = [1, 0, 0, sigma**2, sigma**2, 0, 3 * sigma**4]
+        np.testing.assert_allclose(found, expected, atol=1e-14)
+
+
+def test_choice_of_rule_is_continuous(average):
+    """Across the border between the small cubature and the mapped wedge the result does not jump."""
+    for sigma, k in ((0.06, 1.2), (0.12, 2.5)):
+        border = np.arctan(1 / (4.5 * sigma))
+        theta = border + np.array([-1e-7, 1e-7])
+        found = average(theta, 0.3, 2.0, sigma, k)
+        np.testing.assert_allclose(found[:, 0], found[:, 1], atol=2e-5 * abs(found[1, 0]))
+    for border in (0.06, 0.12):
+        found = average(0.5, 0.4, 2.0, border + np.array([-1e-9, 1e-9]), 2.0)
+        np.testing.assert_allclose(found[:, 0], found[:, 1], atol=2e-6)
+
+
+def test_wedge_distance_and_choice(jit):
+    """Edges are cotθ/σ standard deviations out; grazing or rough surfaces take the wedge."""
+    theta = np.radians([0.0, 30.0, 80.0, 89.9])
+    found = wedge_distance(jit(np.cos(theta)), jit(np.sin(theta)), jit(np.full(4, 0.1))).numpy()
+    np.testing.assert_allclose(found[1:], 1 / np.tan(theta[1:]) / 0.1, rtol=1e-12)
+    assert found[0] == 50.0
+    assert needs_wedge(jit(10.0), jit(4.4), jit(0.04)).numpy()[0]
+    assert needs_wedge(jit(10.0), jit(10.0), jit(0.13)).numpy()[0]
+    assert not needs_wedge(jit(10.0), jit(4.6), jit(0.04)).numpy()[0]
