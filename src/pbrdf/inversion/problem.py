@@ -139,7 +139,7 @@ def residuals(
     stride = dr.opaque(UInt32, points)
     angle_stride = dr.opaque(UInt32, 0 if same_angles else points)
 
-    def function(u: list[Any], lane: Any, point: Any) -> list[Any]:
+    def function(u: list[Any], lane: Any, point: Any) -> tuple[list[Any], Any]:
         values: dict[str, Any] = dict(fixed)
         for p, unknown in zip(space.free, u, strict=True):
             values[p.name] = dr.exp(unknown) if p.logarithmic else unknown
@@ -151,10 +151,11 @@ def residuals(
         f = kernel_from_angles(model, theta_i, theta_r, phi, values, "total")
         modelled = channel_values(f, first.channels, incident)
         at = number * stride + point
-        return [
+        weighted = [
             (m - dr.gather(Float, y, at)) * dr.gather(Float, w, at)
             for m, y, w in zip(modelled, measured, weights, strict=True)
         ]
+        return weighted, f
 
     return Residuals(function, points)
 

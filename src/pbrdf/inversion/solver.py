@@ -7,8 +7,9 @@ geometries, and accepts or rejects. Lanes that have converged leave the batch. T
 whatever the number of lanes, geometries, parameter values or bounds.
 
 The method is Levenberg-Marquardt with Marquardt's scaling, the damping update of Nielsen (1999) and
-projection onto the bounds with an active set (as in Kanzow, Yamashita and Fukushima, J. Comput. Appl. Math.
-172, 375 (2004)).
+projection onto the bounds with an active set (compare Kanzow, Yamashita and Fukushima, J. Comput. Appl. Math.
+172, 375 (2004)): unknowns that a step would carry across a bound are put on it and the step of the others is
+solved again.
 """
 
 from __future__ import annotations
@@ -27,6 +28,9 @@ __all__ = ["Residuals", "Solution", "Status", "solve"]
 #: Iterations of one kernel launch, after which stopped lanes leave the batch. A batch of at most SMALL_BATCH
 #: lanes runs to its end in one launch: recording the kernel anew would take longer than idle lanes do.
 ROUNDS, SMALL_BATCH = 6, 1024
+
+#: How often a step is solved again with the unknowns that would cross a bound held on it.
+BOUND_PASSES = 2
 
 
 class Status(enum.IntEnum):
@@ -53,13 +57,15 @@ class Residuals:
     Attributes
     ----------
     function
-        ``function(u, lane, point)`` returns a list of Dr.Jit floats: the weighted residuals at one point
-        for the unknowns ``u`` (a list of floats); ``lane`` and ``point`` are uint32 indices.
+        ``function(u, lane, point)`` returns a list of Dr.Jit floats, the weighted residuals at one point for
+        the unknowns ``u`` (a list of floats), and whatever else was computed on the way: Dr.Jit 1.5 crashes
+        when an output of a differentiated loop has been released before the derivatives are propagated.
+        ``lane`` and ``point`` are uint32 indices.
     points
         Number of points that every lane runs over.
     """
 
-    function: Callable[[list[Any], Any, Any], Sequence[Any]]
+    function: Callable[[list[Any], Any, Any], tuple[Sequence[Any], Any]]
     points: int
 
 
@@ -279,11 +285,7 @@ def _iterate(
 
     u, g, size = state.u, state.g, len(state.u)
     A = _unpack(state.A, size)
-    # unknowns that stand on a bound and would leave through it are held
-    held = [
-        ((u[i] <= low[i]) & (g[i] > 0.0)) | ((u[i] >= high[i]) & (g[i] < 0.0)) for i in range(size)
-    ]
-    step = _damped_step(A, g, state.damping, held)
+    step = _bounded_step(A, g, state.damping, u, low, high)
     trial = [dr.clip(u[i] + step[i], low[i], high[i]) for i in range(size)]
     delta = [trial[i] - u[i] for i in range(size)]
     # −(gᵀδ + ½ δᵀAδ), the reduction that the quadratic model promises for the projected step
@@ -295,7 +297,7 @@ def _iterate(
     cost, packed, gradient = _normal_equations(residuals, trial, lane)
     first = ~dr.isfinite(state.cost)
     finite = dr.isfinite(cost)
-    accepted = finite & ((cost < state.cost) | first)
+    accepted = finite & (((cost < state.cost) & (predicted > 0.0)) | first)
     gain = dr.select(first, 1.0, (state.cost - cost) / dr.maximum(predicted, 1e-300))
     factor = dr.clip(1.0 - (2.0 * gain - 1.0) ** 3, 1.0 / 5.0, 2.0)
     damping = dr.select(
@@ -305,18 +307,22 @@ def _iterate(
     )
     growth = dr.select(accepted, 2.0, dr.minimum(2.0 * state.growth, 64.0))
 
+    # a step is small because the minimum is near only if damping has not made it so
     length = dr.zeros(type(cost), 1)
-    pull = dr.zeros(type(cost), 1)
+    slope2 = dr.zeros(type(cost), 1)  # largest squared cosine between the residuals and a column of J
     for i in range(size):
-        span = high[i] - low[i]
-        length = dr.maximum(length, dr.abs(delta[i]) / span)
-        pull = dr.maximum(pull, dr.select(held[i], 0.0, dr.abs(g[i]) * span))
+        length = dr.maximum(length, dr.abs(delta[i]) / (high[i] - low[i]))
+        cosine2 = g[i] * g[i] / dr.maximum(2.0 * A[i][i] * state.cost, 1e-300)
+        leaving = ((u[i] <= low[i]) & (g[i] > 0.0)) | ((u[i] >= high[i]) & (g[i] < 0.0))
+        slope2 = dr.maximum(slope2, dr.select(leaving, 0.0, cosine2))
+    free = state.damping <= 1.0
     U = type(state.status)
     status = dr.select(state.damping > 1e12, U(int(Status.STALLED)), U(0))
-    small = predicted < tolerance * tolerance * state.cost
-    status = dr.select(small, U(int(Status.SMALL_REDUCTION)), status)
-    status = dr.select(length < tolerance, U(int(Status.SMALL_STEP)), status)
-    status = dr.select(pull == 0.0, U(int(Status.ZERO_GRADIENT)), status)
+    # below 4e-16 of the cost a reduction cannot be told from rounding
+    small = (predicted >= 0.0) & (predicted <= dr.maximum(tolerance * tolerance, 4e-16) * state.cost)
+    status = dr.select(free & small, U(int(Status.SMALL_REDUCTION)), status)
+    status = dr.select(free & (length < tolerance), U(int(Status.SMALL_STEP)), status)
+    status = dr.select(slope2 <= tolerance * tolerance, U(int(Status.ZERO_GRADIENT)), status)
     status = dr.select((status == 0) & (state.iterations >= limit), U(int(Status.ITERATIONS)), status)
     status = dr.select(first, dr.select(finite, U(0), U(int(Status.NOT_FINITE))), status)
 
@@ -348,7 +354,8 @@ def _normal_equations(residuals: Residuals, u: list[Any], lane: Any) -> tuple[An
     def body(point: Any, u: list[Any], lane: Any, cost: Any, A: list[Any], g: list[Any]) -> tuple[Any, ...]:
         unknown = [Float(v) for v in u]
         dr.enable_grad(unknown)
-        r = [Float(v) for v in residuals.function(unknown, lane, point)]
+        values, alive = residuals.function(unknown, lane, point)
+        r = [Float(v) for v in values]
         J: list[list[Any]] = []
         for v in unknown:
             dr.set_grad(v, 1.0)
@@ -357,6 +364,7 @@ def _normal_equations(residuals: Residuals, u: list[Any], lane: Any) -> tuple[An
             J.append([dr.grad(x) for x in r])
             dr.clear_grad(r)
             dr.clear_grad(v)
+        del alive
         r = [dr.detach(x) for x in r]
         A = [a + _inner(J[i], J[j]) for a, (i, j) in zip(A, triangle, strict=True)]
         g = [b + _inner(J[i], r) for i, b in enumerate(g)]
@@ -392,13 +400,37 @@ def _unpack(packed: list[Any], size: int) -> list[list[Any]]:
     return rows
 
 
-def _damped_step(A: list[list[Any]], g: list[Any], damping: Any, held: list[Any]) -> list[Any]:
-    """Solve (A + λ diag A) δ = −g by Cholesky; held unknowns keep δ = 0."""
+def _bounded_step(
+    A: list[list[Any]], g: list[Any], damping: Any, u: list[Any], low: list[Any], high: list[Any]
+) -> list[Any]:
+    """Solve (A + λ diag A) δ = −g, then again with the unknowns on the bounds that they would cross."""
+    import drjit as dr
+
+    size = len(u)
+    # unknowns that stand on a bound and would leave through it are held
+    held = [((u[i] <= low[i]) & (g[i] > 0.0)) | ((u[i] >= high[i]) & (g[i] < 0.0)) for i in range(size)]
+    known = [dr.zeros(type(u[0]), 1) for _ in range(size)]
+    step = _damped_step(A, g, damping, held, known)
+    for _ in range(BOUND_PASSES):
+        outside = [~held[i] & ((u[i] + step[i] < low[i]) | (u[i] + step[i] > high[i])) for i in range(size)]
+        for i in range(size):
+            known[i] = dr.select(outside[i], dr.clip(u[i] + step[i], low[i], high[i]) - u[i], known[i])
+            held[i] = held[i] | outside[i]
+        step = _damped_step(A, g, damping, held, known)
+    return step
+
+
+def _damped_step(
+    A: list[list[Any]], g: list[Any], damping: Any, held: list[Any], known: list[Any]
+) -> list[Any]:
+    """Solve (A + λ diag A) δ = −g by Cholesky for the unknowns that are not held at ``known`` steps."""
     import drjit as dr
 
     size = len(g)
     # scale to a unit diagonal first: unknowns without influence get a unit row and no step
-    scale = [dr.select(held[i] | (A[i][i] <= 0.0), 0.0, dr.rsqrt(dr.maximum(A[i][i], 1e-300))) for i in range(size)]
+    scale = [
+        dr.select(held[i] | (A[i][i] <= 0.0), 0.0, dr.rsqrt(dr.maximum(A[i][i], 1e-300))) for i in range(size)
+    ]
     L: list[list[Any]] = [[None] * (i + 1) for i in range(size)]
     inverse: list[Any] = [None] * size
     for i in range(size):
@@ -412,7 +444,11 @@ def _damped_step(A: list[list[Any]], g: list[Any], damping: Any, held: list[Any]
                 L[i][j] = value * inverse[j]
     y: list[Any] = []
     for i in range(size):
-        value = -g[i] * scale[i]
+        value = g[i]
+        for j in range(size):
+            if j != i:
+                value = dr.fma(A[max(i, j)][min(i, j)], known[j], value)
+        value = -value * scale[i]
         for q in range(i):
             value = value - L[i][q] * y[q]
         y.append(value * inverse[i])
@@ -422,4 +458,4 @@ def _damped_step(A: list[list[Any]], g: list[Any], damping: Any, held: list[Any]
         for q in range(i + 1, size):
             value = value - L[q][i] * x[q]
         x[i] = value * inverse[i]
-    return [x[i] * scale[i] for i in range(size)]
+    return [dr.select(held[i], known[i], x[i] * scale[i]) for i in range(size)]

@@ -155,8 +155,8 @@ def facet_average(
         x, y, weight = (dr.gather(F, column, offset + j, j < count) for column in nodes)
         return j + 1, add(total, x, y, weight, sigma, geometry, args), sigma, geometry, args
 
-    total = dr.while_loop(
-        (UInt(0), zeros, sigma, geometry, args), lambda j, *_: j < count, clear_body, label="facets"
+    clear = dr.while_loop(
+        (UInt(0), zeros, sigma, geometry, args), lambda j, *_: j < count, clear_body, label="facets", max_iterations=-1
     )[1]
     axes = _wedge_axes(geometry, c_i, c_r)
 
@@ -180,20 +180,25 @@ def facet_average(
             total = add(total, x, y, weight, sigma, geometry, args)
             return column + 1, total, sigma, geometry, args, axes, limits
 
-        total = dr.while_loop(
-            (UInt(0), list(total), sigma, geometry, args, (f, e), (w, low, high, row_weight)),
+        columns = dr.while_loop(
+            (UInt(0), list(zeros), sigma, geometry, args, (f, e), (w, low, high, row_weight)),
             lambda column, *_: column < axis_nodes,
             column_body,
             label="wedge columns",
+            max_iterations=-1,
         )[1]
+        total = [a + b for a, b in zip(total, columns, strict=True)]
         return row + 1, total, sigma, geometry, axes, args
 
-    return dr.while_loop(
-        (UInt(0), list(total), sigma, geometry, axes, args),
+    wedge = dr.while_loop(
+        (UInt(0), list(zeros), sigma, geometry, axes, args),
         lambda row, *_: wedge_lanes & (row < axis_nodes),
         row_body,
         label="wedge rows",
+        max_iterations=-1,
     )[1]
+    # every loop sums up from 0: only then can Dr.Jit differentiate it in reverse without storing its states
+    return [a + b for a, b in zip(clear, wedge, strict=True)]
 
 
 def _squeeze_below(z: Any, high: Any, steepness: Any) -> tuple[Any, Any]:

@@ -174,7 +174,7 @@ def visible_means(geometry: Geometry, k: Any, accuracy: str = "default") -> tupl
 
     state = (a, k, whole, beta, cos_beta, limit, crossing, h_z, q_z, s_z2)
     integral = dr.while_loop(
-        (UInt(0), dr.zeros(F, 1), state), lambda j, *_: j < 2 * count, body, label="lune"
+        (UInt(0), dr.zeros(F, 1), state), lambda j, *_: j < 2 * count, body, label="lune", max_iterations=-1
     )[1]
     return solid_angle, integral
 

@@ -1,0 +1,68 @@
+"""Where the command line writes: results to standard output, everything else to standard error."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+__all__ = ["fail", "output_console", "progress_bar", "reading_width", "warn"]
+
+#: Lines longer than this are hard to read, however wide the terminal is.
+_WIDEST = 110
+#: Width where there is no terminal to ask, as in a pipe.
+_WITHOUT_TERMINAL = 100
+
+
+def reading_width() -> int | None:
+    """Width of lines on standard output; None leaves it to a narrower terminal."""
+    import shutil
+
+    return min(shutil.get_terminal_size((_WITHOUT_TERMINAL, 24)).columns, _WIDEST)
+
+
+def output_console() -> Console:
+    """A console for results; a pipe or a file gets plain text."""
+    from rich.console import Console
+
+    return Console(width=reading_width(), highlight=False, soft_wrap=False)
+
+
+def fail(message: str) -> None:
+    """Write one line about an error."""
+    print(f"pbrdf: error: {message}", file=sys.stderr)
+
+
+def warn(message: str) -> None:
+    """Write one line that a user should see but that stops nothing."""
+    print(f"pbrdf: {message}", file=sys.stderr)
+
+
+@contextmanager
+def progress_bar(what: str, quiet: bool = False) -> Iterator[Callable[[int, int], None]]:
+    """A progress bar on standard error, seen only if that is a terminal, gone when the work is done.
+
+    Yields
+    ------
+    callable
+        To be called with the number of finished pieces and of all.
+    """
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    console = Console(stderr=True)
+    with Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        console=console,
+        transient=True,
+        disable=quiet or not console.is_terminal,
+    ) as progress:
+        task = progress.add_task(what, total=None)
+        yield lambda finished, total: progress.update(task, completed=finished, total=total)

@@ -1,0 +1,89 @@
+"""``pbrdf paints`` and ``pbrdf models``: what the package knows by name."""
+
+from __future__ import annotations
+
+import json
+from typing import Annotated
+
+import typer
+
+from pbrdf.cli.console import output_console
+
+__all__ = ["models", "paints"]
+
+_SOURCE = "Zhang, Song, Zhao, Infrared and Laser Engineering 46(11), 1117002 (2017), Table 1"
+_SCALE = "the amplitude a is on that paper's camera scale: these paints reflect more than they receive"
+
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")]
+
+
+def paints(as_json: AsJson = False) -> None:
+    """List the bundled paints: parameters of the double-Gauss model, and their source."""
+    from rich.table import Table
+
+    from pbrdf.data.paints import PAINTS, WAVELENGTH, load_paint
+
+    if as_json:
+        content = {
+            "source": _SOURCE,
+            "wavelength_nm": WAVELENGTH,
+            "note": _SCALE,
+            "paints": {name: load_paint(name).to_dict() for name in PAINTS},
+        }
+        print(json.dumps(content, indent=2, ensure_ascii=False))
+        return
+    table = Table(box=None, pad_edge=False, title=None)
+    table.add_column("paint")
+    for symbol in ("σ", "n", "a", "k", "b", "t"):
+        table.add_column(symbol, justify="right")
+    for name, values in PAINTS.items():
+        table.add_row(name, *(f"{value:.4f}" for value in values))
+    console = output_console()
+    console.print(table)
+    console.print(f"\nModel double-gauss at {WAVELENGTH:g} nm. Source: {_SOURCE}; {_SCALE}.")
+    console.print(
+        "Each name stands for the model in `pbrdf simulate` and `pbrdf plot`, and for a simulated measurement in "
+        "`pbrdf fit` and `pbrdf check`."
+    )
+
+
+def models(as_json: AsJson = False) -> None:
+    """List the models: their parameters with the bounds of a fit, and their options."""
+    from rich.table import Table
+
+    from pbrdf.models import MODELS
+
+    if as_json:
+        content = {
+            name: {
+                "parameters": [
+                    {
+                        "name": p.name,
+                        "unit": p.unit,
+                        "description": p.description,
+                        "lower": p.lower,
+                        "upper": p.upper,
+                        "default": p.default,
+                        "fitted": p.fitted,
+                    }
+                    for p in model.parameters
+                ],
+                "options": {option: list(choices) for option, choices in model.options.items()},
+            }
+            for name, model in MODELS.items()
+        }
+        print(json.dumps(content, indent=2, ensure_ascii=False))
+        return
+    console = output_console()
+    for name, model in MODELS.items():
+        console.print(f"[bold]{name}[/bold]")
+        table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+        for title in ("  parameter", "meaning", "unit", "bounds of a fit", "if not fitted"):
+            table.add_column(title)
+        for p in model.parameters:
+            fitted = f"{p.lower:g} … {p.upper:g}" + ("" if p.fitted else " with --free")
+            table.add_row(f"  {p.name}", p.description, p.unit, fitted, f"{p.default:g}")
+        console.print(table)
+        for option, choices in model.options.items():
+            console.print(f"  --option {option}={'|'.join(choices)}", markup=False)
+        console.print()

@@ -1,0 +1,92 @@
+"""The command ``pbrdf``: its subcommands, and what a user sees of an error.
+
+Nothing here imports more than typer; every command imports what it needs when it runs, so that the help
+appears at once.
+"""
+
+from __future__ import annotations
+
+import errno
+import sys
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+import pbrdf
+from pbrdf.cli.console import fail
+from pbrdf.cli.doctor import doctor
+from pbrdf.cli.files import check, convert
+from pbrdf.cli.fit import fit
+from pbrdf.cli.lists import models, paints
+from pbrdf.cli.plot import plot
+from pbrdf.cli.simulate import simulate
+from pbrdf.errors import PbrdfError
+
+__all__ = ["app", "main"]
+
+#: Exit code where the input, and not the program, is at fault; the same as for a wrong option.
+USER_ERROR = 2
+
+
+class _Commands(TyperGroup):
+    """The group of all commands; turns errors that a user can mend into one line and exit code 2."""
+
+    def invoke(self, ctx: Any) -> Any:
+        try:
+            return super().invoke(ctx)
+        except PbrdfError as error:
+            fail(str(error))
+        except OSError as error:
+            # The reader of a pipe went away (`pbrdf paints | head -1`): typer ends silently then.
+            if error.errno == errno.EPIPE:
+                raise
+            named = f"{error.filename}: " if error.filename is not None else ""
+            fail(f"{named}{error.strerror or error}")
+        raise typer.Exit(USER_ERROR)
+
+
+app = typer.Typer(
+    cls=_Commands,
+    no_args_is_help=True,
+    add_completion=False,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
+    pretty_exceptions_enable=False,
+)
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        print(f"pbrdf {pbrdf.__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    version: Annotated[
+        bool, typer.Option("--version", help="Show the version and leave.", callback=_show_version, is_eager=True)
+    ] = False,
+) -> None:
+    """Polarimetric reflectance of coatings: fit, predict and draw pBRDF models.
+
+    Angles are in degrees. `pbrdf COMMAND --help` explains a command.
+    """
+
+
+app.command()(fit)
+app.command()(simulate)
+app.command()(plot)
+app.command()(check)
+app.command()(convert)
+app.command()(paints)
+app.command()(models)
+app.command()(doctor)
+
+
+def main() -> None:
+    """Run the command line; the entry point of ``pbrdf``."""
+    for stream in (sys.stdout, sys.stderr):
+        # An old Windows code page has no σ or χ: better a question mark than a crash.
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="replace")
+    app()

@@ -1,0 +1,219 @@
+"""The options that say how to read a file of data, shared by every command that reads one."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from pbrdf.cli.values import number, pairs
+from pbrdf.errors import DataError, PbrdfError
+
+if TYPE_CHECKING:
+    import numpy as np
+    import xarray as xr
+
+__all__ = ["Reading", "with_reading_options"]
+
+_PANEL = "Reading the file"
+_SELECTABLE = ("group", "theta_i", "theta_r", "phi", "wavelength")
+#: Half the width within which a value that was asked for meets a measured one, degrees and nm.
+_TOLERANCE = {"wavelength": 0.5}
+_ANGLE_TOLERANCE = 0.05
+
+
+@dataclass(frozen=True)
+class Reading:
+    """How to read a file, as given on the command line; the fields are the options.
+
+    Attributes
+    ----------
+    format, quantity, azimuth, stokes, illumination, cosine_weighted, angles, skip_invalid
+        As in :func:`pbrdf.read`; None and False where not given.
+    column, where, select
+        Texts ``NAME=VALUE``.
+    wavelength
+        Wavelengths in nm.
+    """
+
+    column: list[str]
+    where: list[str]
+    select: list[str]
+    wavelength: list[float]
+    skip_invalid: bool
+    format: str | None
+    quantity: str | None
+    azimuth: str | None
+    stokes: str | None
+    illumination: str | None
+    cosine_weighted: bool | None
+    angles: str | None
+
+    def stated(self) -> dict[str, Any]:
+        """What was given, by option."""
+        return {f.name: getattr(self, f.name) for f in fields(self) if getattr(self, f.name) not in (None, [], False)}
+
+    def open(self, source: str) -> xr.Dataset:
+        """Read a file, or a bundled paint's experiment if no file has that name.
+
+        Parameters
+        ----------
+        source
+            Path or name.
+
+        Raises
+        ------
+        DataError
+            If there is neither, the file cannot be understood, or nothing is left of it.
+        """
+        from pbrdf.data import read
+        from pbrdf.data.paints import PAINTS, open_experiment
+
+        options = {name: value for name, value in self.stated().items() if name not in ("select", "wavelength")}
+        for name, example in (("column", "I=f_r_per_sr"), ("where", "material=white")):
+            if name in options:
+                options[name] = pairs(options[name], f"--{name}", example)
+        if Path(source).exists():
+            try:
+                dataset = read(source, **options)
+            except DataError as error:
+                raise DataError(_as_on_the_command_line(str(error))) from error
+        elif source in PAINTS:
+            if options:
+                given = ", ".join("--" + name.replace("_", "-") for name in options)
+                raise DataError(f"{source} is a bundled data set and needs no {given}: leave it out")
+            dataset = open_experiment(source)
+        else:
+            names = f", and no bundled paint has that name; those are {', '.join(PAINTS)}"
+            raise DataError(f"{source}: there is no such file{'' if Path(source).suffix else names}")
+        for wanted in self._selections():
+            dataset = _selected(dataset, *wanted, source)
+        return dataset
+
+    def _selections(self) -> list[tuple[str, str]]:
+        selections = list(pairs(self.select, "--select", "theta_i=0:80").items())
+        if self.wavelength:
+            selections.append(("wavelength", ",".join(f"{w:g}" for w in self.wavelength)))
+        return selections
+
+
+def _as_on_the_command_line(message: str) -> str:
+    """Turn the advice to use Python's argument ``column`` into advice to use the option."""
+    return re.sub(r"column=\{'(\w+)': ('[^']*'|…)\}", lambda m: f"--column {m[1]}={m[2].strip(chr(39))}", message)
+
+
+def _selected(dataset: xr.Dataset, kind: str, text: str, source: str) -> xr.Dataset:
+    """The geometries with these values (``10,20``) or in this range (``0:80``) of a coordinate."""
+    import numpy as np
+
+    if kind not in _SELECTABLE:
+        raise PbrdfError(f"--select: select by {', '.join(_SELECTABLE)}, not by {kind!r}")
+    if kind not in dataset.coords:
+        raise DataError(f"{source}: the data state no {kind} to select by")
+    values = dataset[kind].values
+    if kind == "group":
+        keep = np.isin(values.astype(str), [part.strip() for part in text.split(",")])
+        available = sorted(set(values.astype(str)))
+    else:
+        values = values if kind == "wavelength" else np.rad2deg(values)
+        keep = _within(values, text, kind)
+        available = [f"{v:g}" for v in np.unique(np.round(values, 2))]
+    if not keep.any():
+        shown = ", ".join(available[:20]) + (" …" if len(available) > 20 else "")
+        raise DataError(f"{source}: nothing has {kind}={text}; there is {shown}")
+    return dataset.isel(geometry=keep)
+
+
+def _within(values: np.ndarray, text: str, kind: str) -> np.ndarray:
+    import numpy as np
+
+    tolerance = _TOLERANCE.get(kind, _ANGLE_TOLERANCE)
+    option = f"--select {kind}"
+    if ":" in text:
+        ends = text.split(":")
+        if len(ends) != 2:
+            raise PbrdfError(f"{option}={text}: give values like 10,20 or one range like 0:80")
+        low, high = (number(end, option) for end in ends)
+        return (values >= low - tolerance) & (values <= high + tolerance)
+    wanted = np.array([number(part, option) for part in text.split(",")])
+    return (np.abs(values[:, None] - wanted) <= tolerance).any(axis=1)
+
+
+def _option(kind: Any, help: str, *names: str, metavar: str | None = None) -> Any:
+    return Annotated[kind, typer.Option(*names, help=help, metavar=metavar, rich_help_panel=_PANEL)]
+
+
+_OPTIONS: dict[str, tuple[Any, Any]] = {
+    "column": (
+        _option(
+            list[str] | None,
+            "The file's name for a column, e.g. I=f_r_per_sr, or a constant, e.g. phi==0 (repeatable).",
+            metavar="NAME=COLUMN",
+        ),
+        None,
+    ),
+    "where": (
+        _option(list[str] | None, "Take only rows with this text in a column (repeatable).", metavar="COLUMN=TEXT"),
+        None,
+    ),
+    "select": (
+        _option(
+            list[str] | None,
+            f"Take only some geometries, e.g. theta_i=0:80 or group=1,2; by {', '.join(_SELECTABLE)}; "
+            "degrees and nm (repeatable).",
+            metavar="KIND=VALUES",
+        ),
+        None,
+    ),
+    "wavelength": (
+        _option(list[float] | None, "Take only this wavelength in nm (repeatable).", metavar="NM"),
+        None,
+    ),
+    "skip_invalid": (_option(bool, "Leave out rows that hold no usable measurement.", "--skip-invalid"), False),
+    "format": (_option(str | None, "csv, netcdf, scatmech or cornell; found out by itself if not given."), None),
+    "quantity": (
+        _option(str | None, "What the values are, if the file does not say: brdf, reflectance_factor, radiance, dn."),
+        None,
+    ),
+    "azimuth": (_option(str | None, "Where the azimuth is 0: forward=0 or forward=180."), None),
+    "stokes": (_option(str | None, "What Q > 0 means: p-s or s-p."), None),
+    "illumination": (_option(str | None, "Stokes vector of the source: natural or I,Q,U,V."), None),
+    "cosine_weighted": (
+        _option(
+            bool | None,
+            "Whether the values are multiplied by cos θ_r.",
+            "--cosine-weighted/--not-cosine-weighted",
+        ),
+        None,
+    ),
+    "angles": (_option(str | None, "Unit of the file's angles: degrees or radians."), None),
+}
+
+
+def with_reading_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Give a command the options of :class:`Reading` in place of its parameter ``reading``."""
+    signature = inspect.signature(command, eval_str=True)
+    own = [p for p in signature.parameters.values() if p.name != "reading"]
+    added = [
+        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
+        for name, (annotation, default) in _OPTIONS.items()
+    ]
+
+    @functools.wraps(command)
+    def run(**given: Any) -> None:
+        options = {name: given.pop(name) for name in _OPTIONS}
+        for name in ("column", "where", "select", "wavelength"):
+            options[name] = list(options[name] or ())
+        command(reading=Reading(**options), **given)
+
+    # typer reads the command line from the signature, which must not be looked up in the wrapped function
+    del run.__wrapped__  # type: ignore[attr-defined]
+    run.__signature__ = inspect.Signature([*own, *added])  # type: ignore[attr-defined]
+    run.__annotations__ = {p.name: p.annotation for p in (*own, *added)}
+    return run

@@ -1,0 +1,104 @@
+"""What stands after an option: NAME=VALUE, bounds, lists and ranges of angles."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from pbrdf.errors import PbrdfError
+
+__all__ = ["angles", "bounds", "number", "numbers", "pairs", "stokes_vector"]
+
+#: More values than this in one list are a slip of the pen.
+_MOST_VALUES = 100_000
+
+
+def number(text: str, option: str) -> float:
+    """A finite number.
+
+    Raises
+    ------
+    PbrdfError
+        If it is none; names the option.
+    """
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise PbrdfError(f"{option}: {text!r} is not a number")
+    return value
+
+
+def pairs(given: Sequence[str], option: str, example: str) -> dict[str, str]:
+    """Read ``NAME=VALUE`` texts into a table.
+
+    Raises
+    ------
+    PbrdfError
+        If one has another form or a name comes twice; shows an example.
+    """
+    table: dict[str, str] = {}
+    for text in given:
+        name, sign, value = (part.strip() for part in text.partition("="))
+        if not (name and sign and value):
+            raise PbrdfError(f"{option} {text!r}: give NAME=VALUE, for example {option} {example}")
+        if name in table:
+            raise PbrdfError(f"{option}: {name} is given twice")
+        table[name] = value
+    return table
+
+
+def numbers(given: Sequence[str], option: str, example: str) -> dict[str, float]:
+    """Read ``NAME=NUMBER`` texts; raises PbrdfError as :func:`pairs` and :func:`number` do."""
+    return {
+        name: number(value, f"{option} {name}") for name, value in pairs(given, option, example).items()
+    }
+
+
+def bounds(given: Sequence[str], option: str, example: str) -> dict[str, tuple[float, float]]:
+    """Read ``NAME=LOWER:UPPER`` texts; raises PbrdfError if one has another form."""
+    table = {}
+    for name, text in pairs(given, option, example).items():
+        parts = text.split(":")
+        if len(parts) != 2:
+            raise PbrdfError(f"{option} {name}={text}: give LOWER:UPPER, for example {option} {example}")
+        table[name] = (number(parts[0], f"{option} {name}"), number(parts[1], f"{option} {name}"))
+    return table
+
+
+def angles(text: str, option: str) -> list[float]:
+    """Read numbers like ``10,20,30``, ranges like ``0:85:5`` (both ends taken), or a mixture.
+
+    Raises
+    ------
+    PbrdfError
+        If the text has another form or gives too many values.
+    """
+    values: list[float] = []
+    for part in text.split(","):
+        ends = [number(piece.strip(), option) for piece in part.split(":")]
+        if len(ends) == 1:
+            values += ends
+            continue
+        if len(ends) != 3 or ends[2] == 0.0 or (ends[1] - ends[0]) * ends[2] < 0.0:
+            raise PbrdfError(f"{option} {part.strip()!r}: give START:STOP:STEP, for example 0:85:5")
+        start, stop, step = ends
+        # Rounding must not lose the last value: 0:1:0.1 ends at 1.
+        count = math.floor((stop - start) / step + 1e-9) + 1
+        if count > _MOST_VALUES:
+            raise PbrdfError(f"{option} {part.strip()!r}: {count} values are more than the {_MOST_VALUES} allowed")
+        # Twelve digits hide the rounding of the steps: 0.3, not 0.30000000000000004.
+        values += [round(start + i * step, 12) for i in range(count)]
+    return values
+
+
+def stokes_vector(text: str, option: str) -> tuple[float, float, float, float]:
+    """Read four numbers ``I,Q,U,V``, or ``natural``; raises PbrdfError if the text is neither."""
+    if text.strip() == "natural":
+        return (1.0, 0.0, 0.0, 0.0)
+    parts = text.split(",")
+    if len(parts) != 4:
+        raise PbrdfError(f"{option} {text!r}: give natural or four numbers I,Q,U,V, for example 1,0.5,0,0")
+    i, q, u, v = (number(part, option) for part in parts)
+    return (i, q, u, v)
