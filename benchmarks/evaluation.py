@@ -2,15 +2,21 @@
 
     python benchmarks/evaluation.py [--count N] [--repeat R] [--quick] [--json FILE]
 
-Measured is the time for the 4 x 4 Mueller matrices (float64, in and out as NumPy arrays) of random out-of-plane
-geometries, in three cases. pbrdf is timed warm, that is with the kernel compiled; the first call is reported apart.
-The peers, ``benchmarks/peers/``, are a vectorised, cache-blocked NumPy implementation in one process and a
-straightforward C++ program (plain loops, ``g++ -O3 -march=native -ffast-math -fopenmp``) on as many threads as
-pbrdf uses; they are written from the equations, apart from pbrdf's code, and use the same quadrature. All three
-must agree to 1e-9 of f00, else the script ends with status 1.
+Measured is the time for the 4 x 4 Mueller matrices (float64, in and out as NumPy arrays) of random
+out-of-plane geometries, in three cases. pbrdf is timed warm, with its kernel compiled and in memory; the
+first call in a fresh process is reported apart, once with an empty kernel cache (the kernel is compiled) and
+once with the kernel on disk.
 
-Times are minima over interleaved repeats. They depend on the machine (vector units, cores, memory) and on what
-else it is doing; only ratios out of one and the same run mean anything, and these too differ between machines.
+The peers, in ``benchmarks/peers/``, are a vectorised, blocked NumPy implementation in one process and a
+straightforward C++ program (plain loops, ``g++ -O3 -march=native -ffast-math -fopenmp``) on as many threads
+as pbrdf uses. The latter comes in two variants: as most people write it, with an early return for hidden
+facets, and "branchless", without it, which lets g++ vectorise the loop over the facets. The peers are written
+from the equations, apart from pbrdf's code, and use the same quadrature. All must agree to 1e-9 of f00, else
+the script ends with status 1.
+
+Times are minima over interleaved repeats. They depend on the machine (vector units, cores, memory) and on
+what else it is doing: only ratios out of one and the same run mean anything, and they too differ between
+machines.
 """
 
 from __future__ import annotations
@@ -23,6 +29,7 @@ import os
 import platform
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -32,6 +39,7 @@ from typing import Any
 
 import numpy as np
 from peers import double_gauss_numpy as numpy_peer
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
@@ -43,6 +51,11 @@ from pbrdf.optics import quadrature
 HERE = Path(__file__).resolve().parent
 TOLERANCE = 1e-9
 FLAGS = ["-O3", "-march=native", "-ffast-math", "-fopenmp", "-std=c++17", "-shared", "-fPIC"]
+#: Variants of the C++ program: the name of the library and further flags.
+VARIANTS = {
+    "C++": ("double_gauss", []),
+    "C++, branchless": ("double_gauss_branchless", ["-DBRANCHLESS"]),
+}
 #: Matte white, thick, of the paper's Table 1.
 PAINT = numpy_peer.Paint(sigma=0.0398, n=1.6207, a=1.5174, k=1.2504, b=0.1827, t=0.6717)
 
@@ -72,13 +85,13 @@ CASES = (
 class Parameters(ctypes.Structure):
     """``Paint`` of the C++ program."""
 
-    _fields_ = [(name, ctypes.c_double) for name in numpy_peer.Paint._fields]  # noqa: RUF012
+    _fields_ = [(name, ctypes.c_double) for name in numpy_peer.Paint._fields]
 
 
 class RuleStructure(ctypes.Structure):
     """``Rule`` of the C++ program."""
 
-    _fields_ = [  # noqa: RUF012
+    _fields_ = [
         *((name, ctypes.c_double) for name in ("clear_wedge", "sigma_12", "sigma_25", "step", "steepness")),
         ("half", ctypes.c_int64),
     ]
@@ -97,21 +110,23 @@ def default_rule() -> numpy_peer.Rule:
     )
 
 
-def compile_peer() -> tuple[Any, str]:
-    """Compile and load the C++ program; returns it, or None, and a line about the compiler."""
+def compile_peers() -> tuple[dict[str, Any], str]:
+    """Compile and load the variants of the C++ program; returns them by name and the compiler's version."""
     compiler = which("g++")
     if compiler is None:
-        return None, "no g++ on this machine, C++ left out"
-    library = HERE / "build" / "libdouble_gauss.so"
-    library.parent.mkdir(exist_ok=True)
-    command = [compiler, *FLAGS, str(HERE / "peers" / "double_gauss.cpp"), "-o", str(library)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    if done.returncode != 0:
-        return None, f"g++ failed, C++ left out: {done.stderr.strip().splitlines()[-1:]}"
+        return {}, "no g++ on this machine, C++ left out"
+    (HERE / "build").mkdir(exist_ok=True)
+    loaded = {}
+    for name, (stem, extra) in VARIANTS.items():
+        library = HERE / "build" / f"lib{stem}.so"
+        command = [compiler, *FLAGS, *extra, str(HERE / "peers" / "double_gauss.cpp"), "-o", str(library)]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        if done.returncode != 0:
+            return {}, f"g++ failed, C++ left out: {done.stderr.strip()}"
+        loaded[name] = ctypes.CDLL(str(library)).double_gauss_mueller
+        loaded[name].restype = None
     version = subprocess.run([compiler, "-dumpfullversion"], capture_output=True, text=True, check=False)
-    function = ctypes.CDLL(str(library)).double_gauss_mueller
-    function.restype = None
-    return function, f"g++ {version.stdout.strip()} {' '.join(FLAGS[:4])}"
+    return loaded, f"g++ {version.stdout.strip()} {' '.join(FLAGS[:4])}"
 
 
 def cpp_function(library: Any, paint: numpy_peer.Paint, rule: numpy_peer.Rule, threads: int) -> Function:
@@ -150,7 +165,26 @@ def random_geometries(count: int, largest: float) -> tuple[np.ndarray, np.ndarra
     return theta_i, theta_r, random.uniform(0.0, 2.0 * math.pi, count)
 
 
-def measure(case: Case, count: int, repeat: int, library: Any, threads: int) -> dict[str, Any]:
+def first_call(case: Case, count: int) -> float:
+    """Time the first call of a process in seconds."""
+    model = DoubleGauss(**PAINT._replace(sigma=case.sigma)._asdict())
+    get_backend()
+    return timed(model.mueller, random_geometries(count, case.largest))[0]
+
+
+def first_calls(case: Case, count: int) -> dict[str, float]:
+    """Time the first call in fresh processes, with an empty and with a filled kernel cache on disk."""
+    command = [sys.executable, __file__, "--first-call", str(CASES.index(case)), "--count", str(count)]
+    with tempfile.TemporaryDirectory() as directory:
+        environment = {**os.environ, "DRJIT_CACHE_DIR": directory}
+        seconds = [
+            float(subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout)
+            for _ in range(2)
+        ]
+    return {"kernel compiled": seconds[0], "kernel from disk": seconds[1]}
+
+
+def measure(case: Case, count: int, repeat: int, peers: dict[str, Any], threads: int) -> dict[str, Any]:
     """Run one case: check that the implementations agree, then time them in turn."""
     rule = default_rule()
     paint = PAINT._replace(sigma=case.sigma)
@@ -159,11 +193,10 @@ def measure(case: Case, count: int, repeat: int, library: Any, threads: int) -> 
         "pbrdf": model.mueller,
         "NumPy": lambda *angles: numpy_peer.mueller(*angles, paint, rule),
     }
-    if library is not None:
-        functions["C++"] = cpp_function(library, paint, rule, threads)
+    functions |= {name: cpp_function(peer, paint, rule, threads) for name, peer in peers.items()}
     angles = random_geometries(count, case.largest)
 
-    cold, reference = timed(model.mueller, angles)
+    reference = model.mueller(*angles)
     difference = {}
     for name, function in functions.items():
         if name != "pbrdf":
@@ -174,7 +207,7 @@ def measure(case: Case, count: int, repeat: int, library: Any, threads: int) -> 
     seconds: dict[str, list[float]] = {name: [] for name in functions}
     for _ in range(repeat):
         for name, function in functions.items():
-            # the fast ones run several times in a row: the first call after another implementation finds cold caches
+            # the fast ones run several times in a row: the first finds the caches full of another's data
             for _ in range(1 if name == "NumPy" else 3):
                 seconds[name].append(timed(function, angles)[0])
     best = {name: min(values) for name, values in seconds.items()}
@@ -185,7 +218,8 @@ def measure(case: Case, count: int, repeat: int, library: Any, threads: int) -> 
         "largest_zenith_rad": case.largest,
         "count": count,
         "wedge_share": float(np.mean(1.0 / np.tan(farther) <= rule.clear_wedge * case.sigma)),
-        "cold_s": cold,
+        "first_call_s": first_calls(case, count),
+        "threads": {name: 1 if name == "NumPy" else threads for name in functions},
         "best_s": best,
         "median_s": {name: float(np.median(values)) for name, values in seconds.items()},
         "ratio": {name: best[name] / best["pbrdf"] for name in functions if name != "pbrdf"},
@@ -205,45 +239,62 @@ def processor() -> str:
 
 
 def show(console: Console, results: list[dict[str, Any]]) -> None:
-    """Print the table of all cases."""
-    table = Table(title="Mueller matrices, float64; times in ms, least (median) of all repeats")
-    columns = ("implementation", "time", "per direction", "pbrdf is faster by", "aim", "max|Δ|/f00")
-    for column in columns:
-        table.add_column(column, justify="left" if column == "implementation" else "right")
+    """Print a table for each case."""
     for result in results:
-        share = f"{100.0 * result['wedge_share']:.0f} % near the edge of the lit and seen facets"
-        table.add_section()
-        table.add_row(f"[bold]{result['case']}[/bold]\n{result['count']} directions, {share}")
+        table = Table(
+            title=f"{result['case']}: {result['count']} directions, "
+            f"{100.0 * result['wedge_share']:.0f} % in the wedge",
+            title_justify="left",
+            title_style="bold",
+            box=SIMPLE_HEAD,
+            padding=0,
+        )
+        table.add_column("", no_wrap=True, width=16)
+        for column, width in (
+            ("min ms", 7),
+            ("median", 7),
+            ("ns each", 8),
+            ("÷ pbrdf", 8),
+            ("aim", 13),
+            ("max|Δ|/f00", 11),
+        ):
+            table.add_column(column, justify="right", no_wrap=True, width=width)
         for name, best in result["best_s"].items():
             ratio, aim = result["ratio"].get(name), result["aim"].get(name)
             difference = result["difference"].get(name)
             table.add_row(
-                f"  {name}",
-                f"{1e3 * best:.1f} ({1e3 * result['median_s'][name]:.1f})",
-                f"{1e9 * best / result['count']:.0f} ns",
+                name,
+                f"{1e3 * best:.1f}",
+                f"{1e3 * result['median_s'][name]:.1f}",
+                f"{1e9 * best / result['count']:.0f}",
                 "" if ratio is None else f"{ratio:.1f}x",
                 "" if aim is None else f"≥ {aim:g}x {'met' if ratio >= aim else 'missed'}",
                 "" if difference is None else f"{difference:.1e}",
             )
-        table.add_row("  pbrdf, first call", f"{1e3 * result['cold_s']:.1f}")
-    console.print(table)
+        console.print(table)
+        first = ", ".join(f"{1e3 * s:.0f} ms ({how})" for how, s in result["first_call_s"].items())
+        console.print(f"pbrdf's first call in a process: {first}\n", highlight=False)
 
 
 def main() -> int:
     """Run the benchmark; returns the exit status."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--count", type=int, default=10**6, help="directions a call (default 1000000)")
+    parser.add_argument("--count", type=int, default=10**6, help="directions a call (default 10⁶)")
     parser.add_argument("--repeat", type=int, default=5, help="rounds over the implementations (default 5)")
-    parser.add_argument("--quick", action="store_true", help="50000 directions, 2 rounds: a check, not a measurement")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="also write everything measured to this file")
+    parser.add_argument("--quick", action="store_true", help="20000 directions, 2 rounds: a check")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write all results to this file")
+    parser.add_argument("--first-call", type=int, metavar="CASE", help=argparse.SUPPRESS)
     options = parser.parse_args()
-    count, repeat = (50_000, 2) if options.quick else (options.count, options.repeat)
+    count, repeat = (20_000, 2) if options.quick else (options.count, options.repeat)
     if count < 1 or repeat < 1:
         parser.error("--count and --repeat must be at least 1")
+    if options.first_call is not None:
+        print(first_call(CASES[options.first_call], count))
+        return 0
 
     console = Console()
     backend = get_backend()
-    library, compiler = compile_peer()
+    peers, compiler = compile_peers()
     threads = thread_count() if backend.name == "llvm" else os.cpu_count() or 1
     version = llvm_version()
     machine = {
@@ -257,10 +308,11 @@ def main() -> int:
         "compiler": compiler,
     }
     console.print(", ".join(f"{key} {value}" for key, value in machine.items()), highlight=False)
-    results = [measure(case, count, repeat, library, threads) for case in CASES]
+    results = [measure(case, count, repeat, peers, threads) for case in CASES]
     show(console, results)
     if options.json is not None:
-        options.json.write_text(json.dumps({"machine": machine, "tolerance": TOLERANCE, "cases": results}, indent=2) + "\n")
+        report = {"machine": machine, "tolerance": TOLERANCE, "cases": results}
+        options.json.write_text(json.dumps(report, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
     if not all(result["agree"] for result in results):
         console.print(f"[red]The implementations differ by more than {TOLERANCE:g} of f00.[/red]")
         return 1

@@ -3,6 +3,10 @@
 // equations (docs/theory.md) and independent of pbrdf's code; dielectric coating, readings "weighted" and "flux".
 //
 // g++ -O3 -march=native -ffast-math -fopenmp -shared -fPIC double_gauss.cpp -o libdouble_gauss.so
+//
+// With -DBRANCHLESS a hidden facet is given weight 0 instead of being skipped. That is all g++ needs to run the
+// loops over the facets on vectors, with the vector functions of the GNU C library; as most people write it,
+// with the early return, they stay scalar.
 
 #include <algorithm>
 #include <cmath>
@@ -93,8 +97,13 @@ inline void add_facet(const Geometry& g, const Paint& paint, double x, double y,
     const double slope_x = paint.sigma * x, slope_y = paint.sigma * y;
     const double m_z = 1.0 / std::sqrt(1.0 + slope_x * slope_x + slope_y * slope_y);
     const Vec3 m{slope_x * m_z, slope_y * m_z, m_z};
-    const double mu_i = dot(m, g.omega_i), mu_r = dot(m, g.omega_r);
+    double mu_i = dot(m, g.omega_i), mu_r = dot(m, g.omega_r);
+#ifdef BRANCHLESS
+    const bool hidden = mu_i <= 0.0 || mu_r <= 0.0;
+    weight = hidden ? 0.0 : weight, mu_i = hidden ? 1.0 : mu_i, mu_r = hidden ? 1.0 : mu_r;
+#else
     if (mu_i <= 0.0 || mu_r <= 0.0) return;
+#endif
     const double W = weight * std::exp((paint.k - 1.0) * std::log((mu_i + mu_r) * mu_i * mu_r));
     // Fresnel: T_s = 4 c q/(c + q)^2, and (T_p - T_s)/2 = half sin^2(beta) with q^2 = eps - sin^2(beta)
     const double eps = paint.n * paint.n;

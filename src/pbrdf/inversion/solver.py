@@ -318,8 +318,8 @@ def _iterate(
     free = state.damping <= 1.0
     U = type(state.status)
     status = dr.select(state.damping > 1e12, U(int(Status.STALLED)), U(0))
-    # below 4e-16 of the cost a reduction cannot be told from rounding
-    small = (predicted >= 0.0) & (predicted <= dr.maximum(tolerance * tolerance, 4e-16) * state.cost)
+    # below some 1e-15 of the cost a reduction cannot be told from rounding
+    small = (predicted >= 0.0) & (predicted <= dr.maximum(tolerance * tolerance, 4e-15) * state.cost)
     status = dr.select(free & small, U(int(Status.SMALL_REDUCTION)), status)
     status = dr.select(free & (length < tolerance), U(int(Status.SMALL_STEP)), status)
     status = dr.select(slope2 <= tolerance * tolerance, U(int(Status.ZERO_GRADIENT)), status)

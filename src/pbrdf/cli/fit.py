@@ -1,0 +1,155 @@
+"""``pbrdf fit``: a model fitted to measurements, and a folder with what came out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from pbrdf.cli.console import output_console, progress_bar
+from pbrdf.cli.reading import Reading, with_reading_options
+from pbrdf.cli.values import bounds as read_bounds
+from pbrdf.cli.values import numbers, pairs
+from pbrdf.errors import FitError, PbrdfError
+
+if TYPE_CHECKING:
+    from pbrdf.models import Model
+
+__all__ = ["Backend", "fit"]
+
+Backend = Annotated[str | None, typer.Option(help="auto, llvm (processor) or cuda (GPU).", show_default="auto")]
+
+
+@with_reading_options
+def fit(
+    files: Annotated[
+        list[str], typer.Argument(metavar="FILE...", help="Files of measured data, or bundled paints; each is fitted.")
+    ],
+    *,
+    reading: Reading,
+    model: Annotated[
+        str, typer.Option(help="Model (see `pbrdf models`), or a model's JSON file to start from as well.")
+    ] = "double-gauss",
+    option: Annotated[
+        list[str] | None,
+        typer.Option(help="Option of the model, e.g. shadowing=smith (repeatable).", metavar="NAME=VALUE"),
+    ] = None,
+    fix: Annotated[
+        list[str] | None,
+        typer.Option(help="Hold a parameter, e.g. n=1.5 (repeatable).", metavar="NAME=VALUE"),
+    ] = None,
+    free: Annotated[
+        list[str] | None,
+        typer.Option(help="Fit a parameter that is held otherwise, e.g. kappa (repeatable).", metavar="NAME"),
+    ] = None,
+    bounds: Annotated[
+        list[str] | None,
+        typer.Option(help="Bounds of a parameter, e.g. sigma=0.01:0.2 (repeatable).", metavar="NAME=LOW:HIGH"),
+    ] = None,
+    start: Annotated[
+        list[str] | None,
+        typer.Option(help="Value where every start begins, e.g. n=1.6 (repeatable).", metavar="NAME=VALUE"),
+    ] = None,
+    starts: Annotated[int, typer.Option(help="Number of starts, spread over the bounds.")] = 64,
+    noise: Annotated[
+        str | None,
+        typer.Option(
+            help="Noise relative to the intensity, and absolute in units of its median, e.g. 0.02,0.001.",
+            metavar="REL[,ABS]",
+            show_default="the uncertainties in the data, else 0.02,0.001",
+        ),
+    ] = None,
+    hold_out: Annotated[
+        str | None,
+        typer.Option(
+            help="Leave data out and predict them: group=3, theta_i=50, wavelength=550 or fraction=0.2.",
+            metavar="KIND=VALUES",
+        ),
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Seed of the starts and of a held-out fraction.", min=0)] = 0,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output",
+            "-o",
+            help="Folder for the results; with several files, one folder each within it.",
+            show_default="<file>-fit",
+        ),
+    ] = None,
+    figure_format: Annotated[str, typer.Option(help="Format of the figures: png, pdf or svg.")] = "png",
+    backend: Backend = None,
+    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Show the full correlation matrix.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print the names of the folders only.")] = False,
+) -> None:
+    """Fit a model to measured data, and say how well each parameter is known.
+
+    Writes a folder with summary.txt, figure.png, model.json, fit.json (all numbers), comparison.nc (measured,
+    modelled, residual) and starts.png.
+
+    Examples: `pbrdf fit matte-white-thick --hold-out group=3` (bundled data);
+    `pbrdf fit paint.csv --column I=f_r_per_sr --noise 3% --fix n=1.5`
+    """
+    from pbrdf.report.files import FIGURE_FORMATS, require_writable, write_report
+    from pbrdf.report.subject import Report
+
+    if figure_format not in FIGURE_FORMATS:
+        raise PbrdfError(f"--figure-format {figure_format!r}: choose one of {', '.join(FIGURE_FORMATS)}")
+    arguments: dict[str, Any] = {
+        "options": pairs(option or (), "--option", "shadowing=smith"),
+        "fix": numbers(fix or (), "--fix", "n=1.5"),
+        "free": list(free or ()),
+        "bounds": read_bounds(bounds or (), "--bounds", "sigma=0.01:0.2"),
+        "start": numbers(start or (), "--start", "n=1.6"),
+        "starts": starts,
+        "noise": noise,
+        "hold_out": hold_out,
+        "seed": seed,
+    }
+    folders = _folders(files, output)
+    for folder in folders:
+        require_writable(folder)
+    if backend is not None:
+        import pbrdf
+
+        pbrdf.set_backend(backend)
+    chosen = _model(model)
+
+    import pbrdf
+
+    for file, folder in zip(files, folders, strict=True):
+        dataset = reading.open(file)
+        try:
+            with progress_bar(f"Fitting {file}", quiet) as progress:
+                result = pbrdf.fit(dataset, chosen, progress=progress, **arguments)
+        except FitError as error:
+            raise FitError(f"{file}: {error}") from error
+        settings = {"model": model, **arguments, "reading": reading.stated()}
+        report = Report(result, dataset, file, settings)
+        written = write_report(report, folder, figure_format=figure_format)
+        if quiet:
+            print(folder)
+            continue
+        from pbrdf.report.summary import print_summary
+
+        console = output_console()
+        print_summary(report, console, verbose=verbose)
+        console.print(f"\nWritten to {folder}/: {', '.join(path.name for path in written)}", markup=False)
+
+
+def _folders(files: list[str], output: Path | None) -> list[Path]:
+    """Where the results of each file go."""
+    stems = [Path(file).stem for file in files]
+    for stem in stems:
+        if stems.count(stem) > 1:
+            raise PbrdfError(f"two files are called {stem!r}: fit them one after the other, with --output")
+    if output is None:
+        return [Path(f"{stem}-fit") for stem in stems]
+    return [output] if len(files) == 1 else [output / stem for stem in stems]
+
+
+def _model(name: str) -> str | Model:
+    """A model to start from where a file is named, else the name of a model."""
+    from pbrdf.models import load_model
+
+    return load_model(name) if name.endswith(".json") else name

@@ -1,0 +1,169 @@
+"""The folder that a fit leaves behind."""
+
+from __future__ import annotations
+
+import json
+import secrets
+import shutil
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+import pbrdf
+from pbrdf.data.storage import exact_degrees
+from pbrdf.errors import DataError
+from pbrdf.report.numbers import plain
+from pbrdf.report.subject import Report
+from pbrdf.report.summary import summary_text
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["FIGURE_FORMATS", "comparison_file", "fit_record", "require_writable", "write_report"]
+
+FIGURE_FORMATS = ("png", "pdf", "svg")
+
+
+def require_writable(directory: Path) -> None:
+    """Check before long work that a folder of this name can be made or filled, leaving nothing behind.
+
+    Raises
+    ------
+    DataError
+        If it cannot; the message says why.
+    """
+    if directory.exists() and not directory.is_dir():
+        raise DataError(f"{directory}: there is a file of that name; choose another folder with --output")
+    trial = _beside(directory)
+    missing = [p for p in directory.parents if not p.exists()]
+    try:
+        trial.mkdir(parents=True)
+        trial.rmdir()
+    except OSError as error:
+        raise DataError(f"{directory}: cannot be written: {error.strerror or error}") from error
+    finally:
+        for parent in missing:  # innermost first
+            if parent.is_dir():
+                parent.rmdir()
+
+
+def write_report(report: Report, directory: Path, *, figure_format: str = "png") -> list[Path]:
+    """Write the model, the numbers, the comparison, the figures and the summary of a fit.
+
+    Everything is written beside the folder first. A new folder appears complete; in one that is there, the
+    files of the same names are replaced and others are left alone.
+
+    Parameters
+    ----------
+    report
+        What is reported on.
+    directory
+        The folder; made if it is missing.
+    figure_format
+        ``"png"``, ``"pdf"`` or ``"svg"``.
+
+    Returns
+    -------
+    list of Path
+        The files, in the order of their importance to a reader.
+
+    Raises
+    ------
+    DataError
+        If the folder cannot be written.
+    """
+    from pbrdf.report.figures import fit_figure, save_figure, starts_figure
+
+    temporary = _beside(directory)
+    try:
+        temporary.mkdir(parents=True)
+        (temporary / "summary.txt").write_text(summary_text(report), encoding="utf-8")
+        save_figure(fit_figure(report), temporary / f"figure.{figure_format}")
+        report.result.model.to_json(temporary / "model.json")
+        record = json.dumps(fit_record(report), indent=2, ensure_ascii=False, allow_nan=False)
+        (temporary / "fit.json").write_text(record + "\n", encoding="utf-8")
+        comparison_file(report).to_netcdf(temporary / "comparison.nc", engine="h5netcdf")
+        save_figure(starts_figure(report), temporary / f"starts.{figure_format}")
+        names = ["summary.txt", f"figure.{figure_format}", "model.json", "fit.json", "comparison.nc"]
+        names.append(f"starts.{figure_format}")
+        if directory.is_dir():
+            for name in names:
+                (temporary / name).replace(directory / name)
+        else:
+            temporary.rename(directory)
+    except OSError as error:
+        raise DataError(f"{directory}: cannot be written: {error.strerror or error}") from error
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+    return [directory / name for name in names]
+
+
+def _beside(directory: Path) -> Path:
+    resolved = directory.resolve()
+    return resolved.with_name(f".{resolved.name}.{secrets.token_hex(4)}.tmp")
+
+
+def fit_record(report: Report) -> dict[str, Any]:
+    """Everything a program may want to know of a fit, in types that JSON has (NaN as None)."""
+    result = report.result
+    record = {
+        "pbrdf": pbrdf.__version__,
+        "data": {
+            "name": report.name,
+            **{key: report.dataset.attrs[key] for key in ("title", "source", "quantity") if key in report.dataset.attrs},
+            "geometries": report.dataset.sizes["geometry"],
+            "held_out_geometries": int(result.comparison["held_out"].values.sum()),
+        },
+        "settings": dict(report.settings),
+        "model": result.model.to_dict(),
+        "estimates": {
+            name: {
+                "value": e.value,
+                "standard_error": e.std,
+                "unit": e.parameter.unit,
+                "lower": e.lower,
+                "upper": e.upper,
+                "verdict": e.verdict,
+            }
+            for name, e in result.estimates.items()
+        },
+        "correlation": {
+            "parameters": [str(n) for n in result.correlation["parameter"].values],
+            "matrix": result.correlation.values,
+        },
+        "goodness": asdict(result.goodness),
+        "optima": [asdict(optimum) for optimum in result.optima],
+        "starts": result.starts,
+        "converged": result.converged,
+        "noise": result.noise,
+        "uncertainties_from_data": result.std_known,
+        "hold_out": None if result.hold_out is None else str(result.hold_out),
+        "fitted_errors": {region: asdict(errors) for region, errors in result.fitted.items()},
+        "predicted_errors": {region: asdict(errors) for region, errors in result.predicted.items()},
+        "notes": result.notes,
+    }
+    return plain(record)  # type: ignore[return-value]
+
+
+def comparison_file(report: Report) -> xr.Dataset:
+    """Measured, modelled and residual values as they stand in the file: angles in degrees, described."""
+    result = report.result
+    ds = result.comparison.copy()
+    for name in ("theta_i", "theta_r", "phi", "facet_tilt"):
+        radians = ds[name].values
+        degrees = exact_degrees(radians)
+        ds[name] = (ds[name].dims, np.rad2deg(radians) if degrees is None else degrees, {"units": "degree"})
+    for name in ("held_out", "near_specular"):
+        ds[name] = ds[name].astype(np.int8).assign_attrs(long_name=name.replace("_", " "), flag_values="0 no, 1 yes")
+    ds.attrs = {
+        "title": f"{result.model.name} fitted to {report.name}",
+        "source": f"pbrdf {pbrdf.__version__}",
+        "data": str(report.dataset.attrs.get("title", report.name)),
+        "model": json.dumps(result.model.to_dict(), ensure_ascii=False),
+        "noise": result.noise,
+        "hold_out": "" if result.hold_out is None else str(result.hold_out),
+        "values": "on the scale of a BRDF; residual = modelled - measured; Q = I_p - I_s; phi = 0 forward",
+    }
+    return ds
