@@ -1,6 +1,6 @@
 // The double-Gauss pBRDF as a straightforward C++ program: one loop over the directions, loops over the facets
 // inside, std:: functions, OpenMP over the directions. A peer for benchmarks/evaluation.py, written from the
-// equations (docs/theory.md) and independent of pbrdf's code; dielectric coating, readings "weighted" and "flux".
+// equations of the paper and independent of pbrdf's code; dielectric coating, readings "weighted" and "flux".
 //
 // g++ -O3 -march=native -ffast-math -fopenmp -shared -fPIC double_gauss.cpp -o libdouble_gauss.so
 //

@@ -1,6 +1,6 @@
 """The double-Gauss pBRDF in plain NumPy: a peer for ``benchmarks/evaluation.py``.
 
-Written from the equations (``docs/theory.md``) and independent of pbrdf's code, for a dielectric coating in
+Written from the equations of the paper and independent of pbrdf's code, for a dielectric coating in
 the readings ``weighted`` and ``flux``. Vectorised over the directions and the facets together, in blocks of
 a size that was found to be the fastest; the three rules for the facets are those of pbrdf's default accuracy.
 """

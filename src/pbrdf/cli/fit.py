@@ -18,13 +18,16 @@ if TYPE_CHECKING:
 
 __all__ = ["Backend", "fit"]
 
-Backend = Annotated[str | None, typer.Option(help="auto, llvm (processor) or cuda (GPU).", show_default="auto")]
+Backend = Annotated[
+    str | None, typer.Option(help="auto, llvm (processor) or cuda (GPU).", show_default="auto")
+]
 
 
 @with_reading_options
 def fit(
     files: Annotated[
-        list[str], typer.Argument(metavar="FILE...", help="Files of measured data, or bundled paints; each is fitted.")
+        list[str],
+        typer.Argument(metavar="FILE...", help="Files of measured data, or bundled paints; each is fitted."),
     ],
     *,
     reading: Reading,
@@ -45,7 +48,9 @@ def fit(
     ] = None,
     bounds: Annotated[
         list[str] | None,
-        typer.Option(help="Bounds of a parameter, e.g. sigma=0.01:0.2 (repeatable).", metavar="NAME=LOW:HIGH"),
+        typer.Option(
+            help="Bounds of a parameter, e.g. sigma=0.01:0.2 (repeatable).", metavar="NAME=LOW:HIGH"
+        ),
     ] = None,
     start: Annotated[
         list[str] | None,
@@ -79,8 +84,12 @@ def fit(
     ] = None,
     figure_format: Annotated[str, typer.Option(help="Format of the figures: png, pdf or svg.")] = "png",
     backend: Backend = None,
-    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Show the full correlation matrix.")] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print the names of the folders only.")] = False,
+    verbose: Annotated[
+        bool, typer.Option("--verbose", "-v", help="Show the full correlation matrix.")
+    ] = False,
+    quiet: Annotated[
+        bool, typer.Option("--quiet", "-q", help="Print the names of the folders only.")
+    ] = False,
 ) -> None:
     """Fit a model to measured data, and say how well each parameter is known.
 

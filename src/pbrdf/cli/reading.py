@@ -57,7 +57,11 @@ class Reading:
 
     def stated(self) -> dict[str, Any]:
         """What was given, by option."""
-        return {f.name: getattr(self, f.name) for f in fields(self) if getattr(self, f.name) not in (None, [], False)}
+        return {
+            f.name: getattr(self, f.name)
+            for f in fields(self)
+            if getattr(self, f.name) not in (None, [], False)
+        }
 
     def open(self, source: str) -> xr.Dataset:
         """Read a file, or a bundled paint's experiment if no file has that name.
@@ -75,7 +79,9 @@ class Reading:
         from pbrdf.data import read
         from pbrdf.data.paints import PAINTS, open_experiment
 
-        options = {name: value for name, value in self.stated().items() if name not in ("select", "wavelength")}
+        options = {
+            name: value for name, value in self.stated().items() if name not in ("select", "wavelength")
+        }
         for name, example in (("column", "I=f_r_per_sr"), ("where", "material=white")):
             if name in options:
                 options[name] = pairs(options[name], f"--{name}", example)
@@ -105,7 +111,9 @@ class Reading:
 
 def _as_on_the_command_line(message: str) -> str:
     """Turn the advice to use Python's argument ``column`` into advice to use the option."""
-    return re.sub(r"column=\{'(\w+)': ('[^']*'|…)\}", lambda m: f"--column {m[1]}={m[2].strip(chr(39))}", message)
+    return re.sub(
+        r"column=\{'(\w+)': ('[^']*'|…)\}", lambda m: f"--column {m[1]}={m[2].strip(chr(39))}", message
+    )
 
 
 def _selected(dataset: xr.Dataset, kind: str, text: str, source: str) -> xr.Dataset:
@@ -159,7 +167,9 @@ _OPTIONS: dict[str, tuple[Any, Any]] = {
         None,
     ),
     "where": (
-        _option(list[str] | None, "Take only rows with this text in a column (repeatable).", metavar="COLUMN=TEXT"),
+        _option(
+            list[str] | None, "Take only rows with this text in a column (repeatable).", metavar="COLUMN=TEXT"
+        ),
         None,
     ),
     "select": (
@@ -175,10 +185,19 @@ _OPTIONS: dict[str, tuple[Any, Any]] = {
         _option(list[float] | None, "Take only this wavelength in nm (repeatable).", metavar="NM"),
         None,
     ),
-    "skip_invalid": (_option(bool, "Leave out rows that hold no usable measurement.", "--skip-invalid"), False),
-    "format": (_option(str | None, "csv, netcdf, scatmech or cornell; found out by itself if not given."), None),
+    "skip_invalid": (
+        _option(bool, "Leave out rows that hold no usable measurement.", "--skip-invalid"),
+        False,
+    ),
+    "format": (
+        _option(str | None, "csv, netcdf, scatmech or cornell; found out by itself if not given."),
+        None,
+    ),
     "quantity": (
-        _option(str | None, "What the values are, if the file does not say: brdf, reflectance_factor, radiance, dn."),
+        _option(
+            str | None,
+            "What the values are, if the file does not say: brdf, reflectance_factor, radiance, dn.",
+        ),
         None,
     ),
     "azimuth": (_option(str | None, "Where the azimuth is 0: forward=0 or forward=180."), None),

@@ -51,9 +51,7 @@ def pairs(given: Sequence[str], option: str, example: str) -> dict[str, str]:
 
 def numbers(given: Sequence[str], option: str, example: str) -> dict[str, float]:
     """Read ``NAME=NUMBER`` texts; raises PbrdfError as :func:`pairs` and :func:`number` do."""
-    return {
-        name: number(value, f"{option} {name}") for name, value in pairs(given, option, example).items()
-    }
+    return {name: number(value, f"{option} {name}") for name, value in pairs(given, option, example).items()}
 
 
 def bounds(given: Sequence[str], option: str, example: str) -> dict[str, tuple[float, float]]:
@@ -87,7 +85,9 @@ def angles(text: str, option: str) -> list[float]:
         # Rounding must not lose the last value: 0:1:0.1 ends at 1.
         count = math.floor((stop - start) / step + 1e-9) + 1
         if count > _MOST_VALUES:
-            raise PbrdfError(f"{option} {part.strip()!r}: {count} values are more than the {_MOST_VALUES} allowed")
+            raise PbrdfError(
+                f"{option} {part.strip()!r}: {count} values are more than the {_MOST_VALUES} allowed"
+            )
         # Twelve digits hide the rounding of the steps: 0.3, not 0.30000000000000004.
         values += [round(start + i * step, 12) for i in range(count)]
     return values

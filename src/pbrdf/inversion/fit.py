@@ -179,7 +179,7 @@ def fit(
     starts
         Number of starts, spread over the bounds by a Sobol sequence.
     noise
-        Stated noise, a :class:`NoiseModel` or text like ``"0.02,0.001"``; None takes the uncertainties of the
+        Stated noise, a :class:`NoiseModel` or text like ``"0.02,0.01"``; None takes the uncertainties of the
         data set and, where it has none, the default of :class:`NoiseModel`.
     hold_out
         Data left out and then predicted, for example ``"group=3"``; see :class:`HoldOut`.

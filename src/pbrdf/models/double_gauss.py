@@ -196,7 +196,7 @@ class ReciprocalDoubleGauss(Model):
     """Double-Gauss pBRDF in which body light also enters through the facets; beyond the paper.
 
     f = f_mf + f_rpv [(1 − t) D_s + t D_b], D_b = E[W T_out D_s T_in]/E[W] with the transmittances of flux
-    (MODEL section 3): Helmholtz reciprocity holds for the whole Mueller matrix. Parameters are those of
+    (docs/model.md, section 3): Helmholtz reciprocity holds for the whole Mueller matrix. Parameters are those of
     :class:`DoubleGauss`.
     """
 

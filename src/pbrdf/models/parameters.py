@@ -20,7 +20,7 @@ class Parameter:
     description
         What it means, in a few words.
     lower, upper
-        Default bounds for fitting (MODEL section 5).
+        Default bounds for fitting (docs/model.md, section 5).
     domain
         Closed interval outside of which the model is not defined: a value there is an error.
     default

@@ -1,6 +1,6 @@
 """Directions of illumination and view, and the angles between them.
 
-Conventions (MODEL): ẑ is the surface normal; ω_i and ω_r point away from the surface,
+Conventions (docs/model.md, section 1): ẑ is the surface normal; ω_i and ω_r point away from the surface,
 ω_i = (−sinθ_i, 0, cosθ_i), ω_r = (sinθ_r cosφ, sinθ_r sinφ, cosθ_r), so that φ = 0 is the forward
 (specular) half-plane. Light propagates along k_i = −ω_i and k_r = ω_r. In both propagation frames
 s = k×ẑ/|k×ẑ|, p = s×k, hence p×s = k; they are written out from the angles, so they stay defined at

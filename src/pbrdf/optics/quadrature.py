@@ -1,6 +1,6 @@
 """Averages over the facets that are lit and seen.
 
-P dω is exactly a Gaussian density in the facet's two slopes (MODEL section 3), so an average over the
+P dω is exactly a Gaussian density in the facet's two slopes (docs/model.md, section 3), so an average over the
 facets is E[g(x, y); lit and seen] with m ∝ (x, y, 1) and x, y ~ N(0, σ²). "Lit" and "seen" are two
 half-planes in slope space, at c_i = cotθ_i/σ and c_r = cotθ_r/σ standard deviations from the origin.
 

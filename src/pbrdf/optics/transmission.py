@@ -3,9 +3,9 @@
 The light scattered inside the coating is unpolarised until it leaves through a facet, by Fresnel
 transmission at the local exit angle. The facets are averaged with the relative diffuse intensity
 W = [(μ_r' + μ_i') μ_r' μ_i']^(k−1) of local cosines. Only the first column of D_v is other than zero, because
-the body light is depolarised before it leaves (MODEL section 3).
+the body light is depolarised before it leaves (docs/model.md, section 3).
 
-Two readings of eq. (13) are kept (MODEL section 3): ``weighted``, D_v = E[W M_t]/E[W], and ``visible``,
+Two readings of eq. (13) are kept (docs/model.md, section 3): ``weighted``, D_v = E[W M_t]/E[W], and ``visible``,
 D_v = E[W M_t]·∫dω/∫W dω with plain means over the lit and seen facets of the upper hemisphere.
 """
 
@@ -74,7 +74,7 @@ def exit_and_entry_polarisation(
 ) -> list[list[Any]]:
     """3 x 3 block (I, Q, U) of D_b = E[W T_out D_s T_in]/E[W]: light enters and leaves through the facet.
 
-    Beyond the paper (MODEL section 3): with the transmittance of flux on both ways and both frame rotations,
+    Beyond the paper (docs/model.md, section 3): with the transmittance of flux on both ways and both frame rotations,
     Helmholtz reciprocity holds for the whole Mueller matrix.
     """
 
@@ -121,7 +121,7 @@ def visible_means(geometry: Geometry, k: Any, accuracy: str = "default") -> tupl
 
     The first is the spherical triangle of three half-spaces, 2π − θ_i − θ_r − 2β. For the second, take lune
     coordinates about the half vector h, m = (cosλ cosψ, cosλ sinψ, sinλ) along h, q (in the plane of the two
-    rays) and h×q: (μ_i' + μ_r') μ_i' μ_r' = cos³λ · 2 cosβ cosψ cos(ψ−β) cos(ψ+β) (MODEL section 3). The λ
+    rays) and h×q: (μ_i' + μ_r') μ_i' μ_r' = cos³λ · 2 cosβ cosψ cos(ψ−β) cos(ψ+β) (docs/model.md, section 3). The λ
     integral from the horizon up is an incomplete beta function; the ψ integral is split where the horizon
     crosses the plane of the rays and done by the tanh-sinh rule, which takes the algebraic end points.
     """

@@ -112,7 +112,11 @@ def fit_record(report: Report) -> dict[str, Any]:
         "pbrdf": pbrdf.__version__,
         "data": {
             "name": report.name,
-            **{key: report.dataset.attrs[key] for key in ("title", "source", "quantity") if key in report.dataset.attrs},
+            **{
+                key: report.dataset.attrs[key]
+                for key in ("title", "source", "quantity")
+                if key in report.dataset.attrs
+            },
             "geometries": report.dataset.sizes["geometry"],
             "held_out_geometries": int(result.comparison["held_out"].values.sum()),
         },
@@ -156,7 +160,9 @@ def comparison_file(report: Report) -> xr.Dataset:
         degrees = exact_degrees(radians)
         ds[name] = (ds[name].dims, np.rad2deg(radians) if degrees is None else degrees, {"units": "degree"})
     for name in ("held_out", "near_specular"):
-        ds[name] = ds[name].astype(np.int8).assign_attrs(long_name=name.replace("_", " "), flag_values="0 no, 1 yes")
+        ds[name] = (
+            ds[name].astype(np.int8).assign_attrs(long_name=name.replace("_", " "), flag_values="0 no, 1 yes")
+        )
     ds.attrs = {
         "title": f"{result.model.name} fitted to {report.name}",
         "source": f"pbrdf {pbrdf.__version__}",

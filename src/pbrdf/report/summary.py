@@ -192,7 +192,9 @@ def goodness_in_words(result: FitResult) -> list[str]:
     lines = []
     if freedom > 0:
         reduced = g.reduced_chi2
-        lines.append(f"reduced χ² = {brief(reduced, 3)} ({freedom} degrees of freedom): {_chi2_verdict(result)}")
+        lines.append(
+            f"reduced χ² = {brief(reduced, 3)} ({freedom} degrees of freedom): {_chi2_verdict(result)}"
+        )
     else:
         lines.append("no degrees of freedom: there are as many parameters as values")
     without_signal = [name for name in g.r_squared if _is_noise(result, name)]
@@ -228,7 +230,10 @@ def _chi2_verdict(result: FitResult) -> str:
 def _is_noise(result: FitResult, channel: str) -> bool:
     """Whether the measured values of a channel, by their uncertainty, could all be 0."""
     kept = ~result.comparison["held_out"].values
-    ratio = result.comparison[f"{channel}_measured"].values[kept] / result.comparison[f"{channel}_std"].values[kept]
+    ratio = (
+        result.comparison[f"{channel}_measured"].values[kept]
+        / result.comparison[f"{channel}_std"].values[kept]
+    )
     ratio = ratio[np.isfinite(ratio)]
     return bool(ratio.size) and float(np.sqrt((ratio**2).mean())) < _NO_SIGNAL
 
@@ -250,7 +255,11 @@ def optima_in_words(result: FitResult) -> list[str]:
     if others:
         second = others[0]
         times = second.chi2 / best.chi2 if best.chi2 > 0.0 else math.inf
-        worse = f"{brief(times, 3)} times the χ²" if times >= 1.01 else f"χ² higher by {brief(second.chi2 - best.chi2, 2)}"
+        worse = (
+            f"{brief(times, 3)} times the χ²"
+            if times >= 1.01
+            else f"χ² higher by {brief(second.chi2 - best.chi2, 2)}"
+        )
         values = ", ".join(f"{name} {brief(value, 3)}" for name, value in second.values.items())
         lines.append(f"the next best has {worse} ({second.count} starts): {values}")
     else:
@@ -292,6 +301,8 @@ def _error_table(result: FitResult) -> Table:
             style = "bold" if what == "predicted" else None
             table.add_row(f"{what}, {region}", str(p.count), *cells, style=style)
     tilt = math.degrees(math.atan(NEAR_SPECULAR * float(result.model.values["sigma"])))
-    table.caption = f"near-specular: the mirroring facet is tilted by less than {NEAR_SPECULAR:g} σ = {brief(tilt, 2)}°"
+    table.caption = (
+        f"near-specular: the mirroring facet is tilted by less than {NEAR_SPECULAR:g} σ = {brief(tilt, 2)}°"
+    )
     table.caption_justify = "left"
     return table

@@ -1,0 +1,142 @@
+"""Measured points, with the modelled ones beside them, as the figures draw them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pbrdf.data.select import to_brdf_scale
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from pbrdf.report.subject import Report
+
+__all__ = ["Channel", "Points", "dolp_uncertainty"]
+
+
+@dataclass(frozen=True)
+class Channel:
+    """Intensity or DoLP over the geometries; NaN where there is nothing.
+
+    Attributes
+    ----------
+    measured, std, modelled
+        Shape (G,). ``modelled`` is all NaN where there is no model.
+    """
+
+    measured: np.ndarray
+    std: np.ndarray
+    modelled: np.ndarray
+
+
+@dataclass(frozen=True)
+class Points:
+    """What was measured, and where.
+
+    Attributes
+    ----------
+    theta_i, theta_r, phi
+        Degrees, shape (G,); φ within −180 … 180.
+    group
+        Labels as text, shape (G,).
+    held_out
+        Whether a fit left the point out, shape (G,).
+    intensity, dolp
+        Intensity on the scale of a BRDF and degree of linear polarisation; ``dolp`` is None if it was not
+        measured.
+    arbitrary_scale
+        Whether the intensity has an unknown constant factor.
+    """
+
+    theta_i: np.ndarray
+    theta_r: np.ndarray
+    phi: np.ndarray
+    group: np.ndarray
+    held_out: np.ndarray
+    intensity: Channel
+    dolp: Channel | None
+    arbitrary_scale: bool
+
+    @classmethod
+    def from_fit(cls, report: Report) -> Points:
+        """The points of a fit, with the model's values."""
+        comparison = report.result.comparison
+        bare = cls.from_dataset(report.dataset)
+        nothing = np.full(bare.theta_i.shape, np.nan)
+
+        def column(name: str) -> np.ndarray:
+            return comparison[name].values if name in comparison else nothing
+
+        dolp = None
+        if bare.dolp is not None:
+            # a fit with assumed noise knows no uncertainty of the measurement, but what it assumed is drawn
+            std = column("dolp_std")
+            if "dolp_std" not in comparison and "I_std" in comparison:
+                q, u = ("Q", "U") if "Q_std" in comparison else ("m10", "m20")
+                std = dolp_uncertainty(
+                    *(column(f"{name}_measured") for name in ("I", q, u)),
+                    *(column(f"{name}_std") for name in ("I", q, u)),
+                )
+            dolp = Channel(column("dolp_measured"), std, column("dolp_modelled"))
+        return cls(
+            theta_i=bare.theta_i,
+            theta_r=bare.theta_r,
+            phi=bare.phi,
+            group=bare.group,
+            held_out=comparison["held_out"].values,
+            intensity=Channel(column("I_measured"), column("I_std"), column("I_modelled")),
+            dolp=dolp,
+            arbitrary_scale=bare.arbitrary_scale,
+        )
+
+    @classmethod
+    def from_dataset(cls, dataset: xr.Dataset) -> Points:
+        """The points of a data set, without a model."""
+        ds = to_brdf_scale(dataset)
+        nothing = np.full(ds.sizes["geometry"], np.nan)
+
+        def column(name: str) -> np.ndarray:
+            return ds[name].values if name in ds else nothing
+
+        if "mueller" in ds:
+            M = ds["mueller"].values
+            S = np.array(column("mueller_std") if "mueller_std" in ds else np.full(M.shape, np.nan))
+            stokes, std = [M[:, i, 0] for i in range(3)], [S[:, i, 0] for i in range(3)]
+        else:
+            stokes = [column(name) for name in "IQU"]
+            std = [column(f"{name}_std") for name in "IQU"]
+        dolp = None
+        if "dolp" in ds:
+            dolp = Channel(column("dolp"), column("dolp_std"), nothing)
+        elif np.isfinite(stokes[1]).any():
+            with np.errstate(divide="ignore", invalid="ignore"):
+                value = np.hypot(stokes[1], np.nan_to_num(stokes[2])) / stokes[0]
+            dolp = Channel(value, dolp_uncertainty(*stokes, *std), nothing)
+        phi = np.rad2deg(ds["phi"].values)
+        return cls(
+            theta_i=np.rad2deg(ds["theta_i"].values),
+            theta_r=np.rad2deg(ds["theta_r"].values),
+            phi=180.0 - (180.0 - phi) % 360.0,
+            group=ds["group"].values.astype(str),
+            held_out=np.zeros(nothing.shape, dtype=bool),
+            intensity=Channel(stokes[0], std[0], nothing),
+            dolp=dolp,
+            arbitrary_scale=ds.attrs.get("scale") == "arbitrary",
+        )
+
+
+def dolp_uncertainty(
+    I: np.ndarray, Q: np.ndarray, U: np.ndarray, s_I: np.ndarray, s_Q: np.ndarray, s_U: np.ndarray
+) -> np.ndarray:
+    """Standard uncertainty of √(Q² + U²)/I from independent ones, to first order.
+
+    U may be NaN throughout (not measured). Where Q = U = 0, where the first order fails, that of Q/I is given.
+    """
+    U, s_U = np.nan_to_num(U), np.nan_to_num(s_U)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        size = np.hypot(Q, U)
+        along = np.where(size > 0.0, np.hypot(Q * s_Q, U * s_U) / size, s_Q)
+        return np.hypot(along, size / I * s_I) / np.abs(I)
