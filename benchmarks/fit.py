@@ -92,7 +92,9 @@ def fit_scipy(data: list[Observations], stokes) -> tuple[float, np.ndarray]:
             modelled = stokes(x, observed.theta_i, observed.theta_r, observed.phi)
             return ((modelled.T - observed.values) / observed.std).ravel()
 
-        found.append(least_squares(residual, GUESS, bounds=(box.lower, box.upper), x_scale=np.abs(GUESS) + 0.1).x)
+        found.append(
+            least_squares(residual, GUESS, bounds=(box.lower, box.upper), x_scale=np.abs(GUESS) + 0.1).x
+        )
     return time.perf_counter() - clock, np.array(found)
 
 
@@ -143,10 +145,14 @@ def main() -> int:
         table.add_row(name, f"{1e3 * seconds:.3f}", f"{seconds / best['batch']:.0f}")
     console = Console()
     console.print(table)
-    console.print(f"batch: {1.0 / best['batch']:.0f} fits/s; first call, kernels compiled or loaded: {cold:.2f} s")
+    console.print(
+        f"batch: {1.0 / best['batch']:.0f} fits/s; first call, kernels compiled or loaded: {cold:.2f} s"
+    )
     console.print(f"ratio to the faster SciPy: {ratio:.0f} (aim: {AIM:.0f})")
     if options.json:
-        options.json.write_text(json.dumps({"seconds_per_fit": best, "first_call": cold, "ratio": ratio}, indent=2))
+        options.json.write_text(
+            json.dumps({"seconds_per_fit": best, "first_call": cold, "ratio": ratio}, indent=2)
+        )
     return 0
 
 

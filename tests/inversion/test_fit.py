@@ -43,7 +43,9 @@ def scipy_optimum(dataset, result, free=FREE):
     rows = ["IQUV".index(c) for c in data.channels]
 
     def residual(x):
-        model = type(result.model).from_values({**fixed, **dict(zip(free, x, strict=True))}, **result.model.chosen)
+        model = type(result.model).from_values(
+            {**fixed, **dict(zip(free, x, strict=True))}, **result.model.chosen
+        )
         S = model.stokes(data.theta_i, data.theta_r, data.phi)
         return ((S.T[rows] - data.values) * data.weights).ravel()
 
@@ -51,7 +53,14 @@ def scipy_optimum(dataset, result, free=FREE):
     low, high = np.array([[e.lower, e.upper] for e in estimates]).T
     start = np.clip(np.array([e.value for e in estimates]) * 1.02 + 1e-3, low, high)
     return least_squares(
-        residual, start, bounds=(low, high), x_scale=np.abs(start), jac="3-point", xtol=1e-15, ftol=1e-15, gtol=1e-15
+        residual,
+        start,
+        bounds=(low, high),
+        x_scale=np.abs(start),
+        jac="3-point",
+        xtol=1e-15,
+        ftol=1e-15,
+        gtol=1e-15,
     )
 
 

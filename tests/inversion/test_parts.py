@@ -31,7 +31,7 @@ def test_noise_is_relative_in_the_bright_and_absolute_in_the_dark():
 def test_noise_is_read_as_numbers_or_percentages():
     assert NoiseModel.parse("2%,0.1%") == NoiseModel(0.02, 0.001)
     assert NoiseModel.parse("0.05") == NoiseModel(0.05)
-    with pytest.raises(FitError, match="relative part is -1.0"):
+    with pytest.raises(FitError, match=r"relative part is -1\.0"):
         NoiseModel.parse("-1")
 
 

@@ -68,7 +68,12 @@ def test_bounds_that_bind_are_kept_and_agree_with_scipy(noisy_exponentials):
     assert on_bound.any(axis=1).sum() > 20, "the bounds of this problem are meant to bind"
     for lane in range(40):
         peer = least_squares(
-            exponential_residual, [1.0, 1.0, 0.5], bounds=(lower, upper), args=(x, y[lane]), xtol=1e-15, ftol=1e-15
+            exponential_residual,
+            [1.0, 1.0, 0.5],
+            bounds=(lower, upper),
+            args=(x, y[lane]),
+            xtol=1e-15,
+            ftol=1e-15,
         )
         # SciPy's reflective method stays a little inside a bound; ours stands on it
         np.testing.assert_allclose(solution.u[lane], peer.x, atol=2e-5)
@@ -81,9 +86,7 @@ def test_gradient_vanishes_at_the_optimum_and_is_jt_r(noisy_exponentials):
     solution = solve(exponential_problem(y, x), np.tile([1.0, 1.0, 0.0], (40, 1)), *wide)
     scale = np.sqrt(np.einsum("bii->bi", solution.information) * 2.0 * solution.cost[:, None])
     assert (np.abs(solution.gradient) <= 1e-7 * scale).all()
-    stopped = solve(
-        exponential_problem(y, x), np.tile([1.0, 1.0, 0.0], (40, 1)), *wide, max_iterations=1
-    )
+    stopped = solve(exponential_problem(y, x), np.tile([1.0, 1.0, 0.0], (40, 1)), *wide, max_iterations=1)
     u = stopped.u[0]
     r = exponential_residual(u, x, y[0])
     J = np.column_stack([np.exp(-u[1] * x), -u[0] * x * np.exp(-u[1] * x), np.ones_like(x)])
@@ -97,7 +100,9 @@ def test_a_large_batch_gives_what_its_lanes_give_alone(noisy_exponentials):
     """More lanes than run in one launch: lanes that have stopped leave, the others keep their own data."""
     x, y = noisy_exponentials
     rng = np.random.default_rng(0)
-    start = np.column_stack([rng.uniform(0.2, 9, 1600), rng.uniform(0.1, 4.5, 1600), rng.uniform(-1, 1, 1600)])
+    start = np.column_stack(
+        [rng.uniform(0.2, 9, 1600), rng.uniform(0.1, 4.5, 1600), rng.uniform(-1, 1, 1600)]
+    )
     lower, upper = np.array([0.1, 0.05, -2.0]), np.array([10.0, 5.0, 2.0])
     many = solve(exponential_problem(np.tile(y, (40, 1)), x), start, lower, upper)
     few = solve(exponential_problem(y, x), np.tile([1.0, 1.0, 0.0], (40, 1)), lower, upper)
@@ -158,3 +163,18 @@ def test_progress_counts_up_to_all_lanes(noisy_exponentials):
         progress=lambda done, total: seen.append((done, total)),
     )
     assert seen[-1] == (40, 40)
+
+
+def test_lanes_may_have_bounds_of_their_own(noisy_exponentials):
+    """A lane whose bounds of one unknown are equal holds it: SciPy without that unknown agrees."""
+    x, y = noisy_exponentials
+    lower, upper = np.tile([-10.0, -10.0, -10.0], (40, 1)), np.tile([10.0, 10.0, 10.0], (40, 1))
+    held = np.linspace(0.5, 2.0, 40)
+    lower[:, 1] = upper[:, 1] = held
+    solution = solve(exponential_problem(y, x), np.tile([1.0, 1.0, 0.0], (40, 1)), lower, upper)
+    assert solution.converged.all()
+    np.testing.assert_array_equal(solution.u[:, 1], held)
+    for lane in range(0, 40, 7):
+        design = np.column_stack([np.exp(-held[lane] * x), np.ones_like(x)])
+        expected = np.linalg.lstsq(design, y[lane], rcond=None)[0]
+        np.testing.assert_allclose(solution.u[lane, [0, 2]], expected, rtol=1e-7)

@@ -6,7 +6,7 @@ import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -116,6 +116,10 @@ class FitResult:
         χ² at the end of every start, shape (S,).
     seconds
         Time the solver took.
+    space, data
+        The free parameters and the fitted observations, for further analysis (profiles, bootstrap).
+    unknowns, information
+        The solver's unknowns at the best optimum, shape (P,), and JᵀJ there, shape (P, P).
     """
 
     model: Model
@@ -131,6 +135,10 @@ class FitResult:
     noise: str
     std_known: bool
     hold_out: HoldOut | None
+    space: Space = field(repr=False)
+    data: Observations = field(repr=False)
+    unknowns: np.ndarray = field(repr=False)
+    information: np.ndarray = field(repr=False)
     notes: list[str] = field(default_factory=list)
     start_values: np.ndarray = field(default_factory=lambda: np.empty((0, 0)), repr=False)
     end_values: np.ndarray = field(default_factory=lambda: np.empty((0, 0)), repr=False)
@@ -212,8 +220,8 @@ def fit(
     space, begin = _space(model, options or {}, fix or {}, free, bounds or {}, start or {}, fitted_data)
     if fitted_data.count <= len(space.free):
         raise FitError(
-            f"{fitted_data.count} measured values cannot determine {len(space.free)} parameters: measure more, "
-            "hold out less, or fix parameters"
+            f"{fitted_data.count} measured values cannot determine {len(space.free)} parameters: measure "
+            "more, hold out less, or fix parameters"
         )
     low, high = space.to_unknowns(space.lower), space.to_unknowns(space.upper)
     first = sobol_starts(low, high, starts, seed)
@@ -324,13 +332,17 @@ def _bounds(
     if given is not None:
         low, high = (float(v) for v in given)
         if not (math.isfinite(low) and math.isfinite(high) and low < high):
-            raise FitError(f"bounds: {p.name} needs two finite numbers, the lower first; got {low:g} … {high:g}")
+            raise FitError(
+                f"bounds: {p.name} needs two finite numbers, the lower first; got {low:g} … {high:g}"
+            )
         if p.logarithmic and low <= 0.0:
             raise FitError(f"bounds: {p.name} must be above 0, got {low:g}")
         return low, high
     if p.name == "a":
         # the amplitude is on the data's own scale: π times a typical value is its order of magnitude
-        intensity = np.concatenate([data.values[c] for c, n in enumerate(data.channels) if n in ("I", "m00")] or [[1.0]])
+        intensity = np.concatenate(
+            [data.values[c] for c, n in enumerate(data.channels) if n in ("I", "m00")] or [np.ones(1)]
+        )
         positive = intensity[intensity > 0.0]
         scale = math.pi * float(np.median(positive)) if positive.size else 1.0
         return 1e-3 * scale, 1e3 * scale
@@ -339,7 +351,9 @@ def _bounds(
     return p.lower, p.upper
 
 
-def _apply_starts(first: np.ndarray, space: Space, begin: Mapping[str, float], start: Mapping[str, float]) -> None:
+def _apply_starts(
+    first: np.ndarray, space: Space, begin: Mapping[str, float], start: Mapping[str, float]
+) -> None:
     """Put the user's starting values into the drawn ones, in place."""
     values = space.to_parameters(first)
     for i, p in enumerate(space.free):
@@ -391,7 +405,9 @@ def _summarise(
     regions = {"all": np.ones_like(held), "near-specular": near, "off-specular": ~near}
 
     def by_region(chosen: np.ndarray) -> dict[str, Prediction]:
-        return {n: prediction_errors(comparison, chosen & m) for n, m in regions.items() if (chosen & m).any()}
+        return {
+            n: prediction_errors(comparison, chosen & m) for n, m in regions.items() if (chosen & m).any()
+        }
 
     names = xr.DataArray(
         np.asarray(correlation[1]),
@@ -413,6 +429,10 @@ def _summarise(
         noise=_noise_in_words(noise, fitted_data),
         std_known=fitted_data.std_known,
         hold_out=hold_out,
+        space=space,
+        data=fitted_data,
+        unknowns=solution.u[best],
+        information=solution.information[best],
         start_values=space.to_parameters(first),
         end_values=space.to_parameters(solution.u),
         chi2_by_start=2.0 * solution.cost,
@@ -452,13 +472,13 @@ def compare(model: Model, observations: Observations, dataset: xr.Dataset) -> xr
     if "m00" in measured:
         measured["I"], std["I"] = measured["m00"], std["m00"]
     if "dolp" not in measured:
-        I, Q, U = (
-            measured.get(a, measured.get(b)) for a, b in (("I", "m00"), ("Q", "m10"), ("U", "m20"))
-        )
+        I, Q, U = (measured.get(a, measured.get(b)) for a, b in (("I", "m00"), ("Q", "m10"), ("U", "m20")))
         if I is not None and Q is not None:
             with np.errstate(divide="ignore", invalid="ignore"):
                 measured["dolp"] = np.hypot(Q, 0.0 if U is None else U) / I
-    result = xr.Dataset(coords={name: dataset[name] for name in dataset.coords if name not in ("stokes_out", "stokes_in")})
+    result = xr.Dataset(
+        coords={name: dataset[name] for name in dataset.coords if name not in ("stokes_out", "stokes_in")}
+    )
     for name in dict.fromkeys((*observations.channels, "I", "dolp")):
         unit = "1" if name == "dolp" else "1/sr"
         columns = {"modelled": everything[name]}

@@ -152,10 +152,15 @@ def _std(ds: xr.Dataset, name: str) -> np.ndarray:
 
 
 def _propagated(
-    I: np.ndarray, dolp: np.ndarray, aolp: np.ndarray, s_I: np.ndarray, s_dolp: np.ndarray, s_aolp: np.ndarray
+    intensity: np.ndarray,
+    dolp: np.ndarray,
+    aolp: np.ndarray,
+    s_I: np.ndarray,
+    s_dolp: np.ndarray,
+    s_aolp: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Standard uncertainties of Q = I p cos2ψ and U = I p sin2ψ from independent ones of I, p and ψ."""
     c, s = np.cos(2.0 * aolp), np.sin(2.0 * aolp)
-    along = (dolp * s_I) ** 2 + (I * s_dolp) ** 2
-    across = (2.0 * I * dolp * s_aolp) ** 2
+    along = (dolp * s_I) ** 2 + (intensity * s_dolp) ** 2
+    across = (2.0 * intensity * dolp * s_aolp) ** 2
     return np.sqrt(along * c * c + across * s * s), np.sqrt(along * s * s + across * c * c)

@@ -121,7 +121,8 @@ def solve(
     start
         Starting values, shape (B, P); moved onto the bounds where outside.
     lower, upper
-        Bounds, shape (P,).
+        Bounds, shape (P,), or (B, P) for bounds of each lane's own; an unknown whose two bounds are equal stays
+        there, which is how profiles hold one.
     max_iterations
         Steps tried at most.
     tolerance
@@ -140,18 +141,16 @@ def solve(
     backend = get_backend()
     Float, UInt32 = backend.Float, backend.UInt32
     batch, size = start.shape
-    # bounds are opaque, so that other bounds do not mean another kernel
-    low = [dr.opaque(Float, float(v)) for v in lower]
-    high = [dr.opaque(Float, float(v)) for v in upper]
+    lower, upper = (np.broadcast_to(np.asarray(b, dtype=float), start.shape) for b in (lower, upper))
     result = _Result(batch, size)
     # a batch of one would be compiled apart, as a broadcast: double it
     lanes = np.arange(batch, dtype=np.uint32) if batch > 1 else np.zeros(2, dtype=np.uint32)
-    state = _State.initial(backend, np.clip(start, lower, upper)[lanes])
+    state = _State.initial(backend, np.clip(start, lower, upper)[lanes], lower[lanes], upper[lanes])
     limit = dr.opaque(UInt32, max_iterations)
     small = dr.opaque(Float, tolerance)
     while len(lanes):
         active = backend.upload(UInt32, lanes)
-        state = _iterations(residuals, state, active, low, high, small, limit)
+        state = _iterations(residuals, state, active, small, limit)
         status = state.status.numpy()
         done = status != Status.RUNNING
         if done.any():
@@ -172,6 +171,8 @@ class _State:
     """Everything that an iteration hands to the next, as Dr.Jit arrays over the running lanes."""
 
     u: list[Any]
+    low: list[Any]
+    high: list[Any]
     cost: Any
     A: list[Any]
     g: list[Any]
@@ -181,7 +182,7 @@ class _State:
     iterations: Any
 
     @classmethod
-    def initial(cls, backend: Any, start: np.ndarray) -> _State:
+    def initial(cls, backend: Any, start: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> _State:
         # infinite cost and an identity for JᵀJ: the first "step" has length 0 and is always accepted
         import drjit as dr
 
@@ -191,8 +192,13 @@ class _State:
         def full(value: float) -> Any:
             return dr.opaque(Float, value, batch)
 
+        def columns(values: np.ndarray) -> list[Any]:
+            return [backend.upload(Float, values[:, i]) for i in range(size)]
+
         return cls(
-            u=[backend.upload(Float, start[:, i]) for i in range(size)],
+            u=columns(start),
+            low=columns(lower),
+            high=columns(upper),
             cost=full(np.inf),
             A=[full(1.0 if i == j else 0.0) for i in range(size) for j in range(i + 1)],
             g=[full(0.0) for _ in range(size)],
@@ -207,7 +213,9 @@ class _State:
         import drjit as dr
 
         def take(value: Any) -> Any:
-            return [take(v) for v in value] if isinstance(value, list) else dr.gather(type(value), value, index)
+            return (
+                [take(v) for v in value] if isinstance(value, list) else dr.gather(type(value), value, index)
+            )
 
         state = _State(**{f.name: take(getattr(self, f.name)) for f in fields(self)})
         dr.eval(state)
@@ -237,7 +245,7 @@ class _Result:
     def solution(self) -> Solution:
         batch, size = self.u.shape
         information = np.empty((batch, size, size))
-        for c, (i, j) in enumerate((i, j) for i in range(size) for j in range(i + 1)):
+        for c, (i, j) in enumerate(zip(*np.tril_indices(size), strict=True)):
             information[:, i, j] = information[:, j, i] = self.A[:, c]
         return Solution(self.u, self.cost, information, self.g, self.status, self.iterations)
 
@@ -246,8 +254,6 @@ def _iterations(
     residuals: Residuals,
     state: _State,
     lane: Any,
-    low: list[Any],
-    high: list[Any],
     tolerance: Any,
     limit: Any,
 ) -> _State:
@@ -261,7 +267,7 @@ def _iterations(
         return count + 1, _iterate(residuals, state, lane, *fixed), lane, *fixed
 
     result = dr.while_loop(
-        (UInt32(0), state, lane, low, high, tolerance, limit),
+        (UInt32(0), state, lane, tolerance, limit),
         lambda count, state, *_: (count < rounds) & (state.status == int(Status.RUNNING)),
         body,
         mode="symbolic",
@@ -275,15 +281,13 @@ def _iterate(
     residuals: Residuals,
     state: _State,
     lane: Any,
-    low: list[Any],
-    high: list[Any],
     tolerance: Any,
     limit: Any,
 ) -> _State:
     """One step of every lane."""
     import drjit as dr
 
-    u, g, size = state.u, state.g, len(state.u)
+    u, g, size, low, high = state.u, state.g, len(state.u), state.low, state.high
     A = _unpack(state.A, size)
     step = _bounded_step(A, g, state.damping, u, low, high)
     trial = [dr.clip(u[i] + step[i], low[i], high[i]) for i in range(size)]
@@ -311,7 +315,7 @@ def _iterate(
     length = dr.zeros(type(cost), 1)
     slope2 = dr.zeros(type(cost), 1)  # largest squared cosine between the residuals and a column of J
     for i in range(size):
-        length = dr.maximum(length, dr.abs(delta[i]) / (high[i] - low[i]))
+        length = dr.maximum(length, dr.abs(delta[i]) / dr.maximum(high[i] - low[i], 1e-300))
         cosine2 = g[i] * g[i] / dr.maximum(2.0 * A[i][i] * state.cost, 1e-300)
         leaving = ((u[i] <= low[i]) & (g[i] > 0.0)) | ((u[i] >= high[i]) & (g[i] < 0.0))
         slope2 = dr.maximum(slope2, dr.select(leaving, 0.0, cosine2))
@@ -331,6 +335,8 @@ def _iterate(
 
     return _State(
         u=keep(trial, u),
+        low=low,
+        high=high,
         cost=dr.select(accepted, cost, state.cost),
         A=keep(packed, state.A),
         g=keep(gradient, g),

@@ -27,8 +27,8 @@ Matrix = list[list[Any]]
 class Model:
     """Base of the pBRDF models.
 
-    A subclass names its ``parameters`` and ``options`` and gives ``kernel``, its Mueller matrix over generic Dr.Jit
-    floats; evaluation, checks, printing and JSON come from here. Instances are immutable.
+    A subclass names its ``parameters`` and ``options`` and gives ``kernel``, its Mueller matrix over generic
+    Dr.Jit floats; evaluation, checks, printing and JSON come from here. Instances are immutable.
 
     Attributes
     ----------
@@ -153,7 +153,9 @@ class Model:
         known = set(self.values) | set(self.chosen)
         for name in changes:
             if name not in known:
-                raise ModelError(f"{self.name} has no parameter or option {name!r}: {', '.join(sorted(known))}")
+                raise ModelError(
+                    f"{self.name} has no parameter or option {name!r}: {', '.join(sorted(known))}"
+                )
         values = {k: changes.get(k, v) for k, v in self.values.items()}
         chosen = {k: changes.get(k, v) for k, v in self.chosen.items()}
         return self.from_values(values, **chosen)
@@ -221,7 +223,9 @@ def load_model(source: str | os.PathLike[str] | Mapping[str, Any]) -> Model:
         try:
             content = json.loads(text)
         except json.JSONDecodeError as error:
-            raise ModelError(f"{where}not JSON, line {error.lineno} column {error.colno}: {error.msg}") from error
+            raise ModelError(
+                f"{where}not JSON, line {error.lineno} column {error.colno}: {error.msg}"
+            ) from error
     if not isinstance(content, Mapping) or "model" not in content:
         raise ModelError(f'{where}not a model: the key "model" is missing')
     cls = MODELS.get(content["model"])
@@ -234,7 +238,9 @@ def load_model(source: str | os.PathLike[str] | Mapping[str, Any]) -> Model:
     for kind, given, known in (("parameter", parameters, names), ("option", options, list(cls.options))):
         for name in given:
             if name not in known:
-                raise ModelError(f"{where}unknown {kind} {name!r} of {cls.name}: known are {', '.join(known)}")
+                raise ModelError(
+                    f"{where}unknown {kind} {name!r} of {cls.name}: known are {', '.join(known)}"
+                )
     missing = [p.name for p in cls.parameters if p.fitted and p.name not in parameters]
     if missing:
         raise ModelError(f"{where}parameter {missing[0]!r} of {cls.name} is missing")
@@ -275,7 +281,8 @@ def _checked_value(parameter: Parameter, value: Any) -> Any:
         worst = numbers[bad].flat[0] if numbers.ndim else float(numbers)
         limits = f"{low:g} or more" if math.isinf(high) else f"within {low:g} … {high:g}"
         raise ModelError(
-            f"{parameter.name}={worst:g}{where} is outside its domain: {parameter.description} must be {limits}"
+            f"{parameter.name}={worst:g}{where} is outside its domain: {parameter.description} must be "
+            f"{limits}"
         )
     return kept
 

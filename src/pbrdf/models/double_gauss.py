@@ -158,7 +158,9 @@ class DoubleGauss(Model):
         if self.chosen["normalization"] == "visible":
             k = evaluation.to_numpy(self.values["k"])
             if k is not None and (k <= 1.0 / 3.0).any():
-                raise ModelError(f"k={k.min():g}: normalization='visible' needs k > 1/3, its integral diverges")
+                raise ModelError(
+                    f"k={k.min():g}: normalization='visible' needs k > 1/3, its integral diverges"
+                )
 
     def kernel(self, geometry: Geometry, values: Mapping[str, Any], part: str = "total") -> Matrix:
         """4 x 4 Mueller matrix over generic Dr.Jit floats, paper eq. (14)."""
@@ -196,8 +198,8 @@ class ReciprocalDoubleGauss(Model):
     """Double-Gauss pBRDF in which body light also enters through the facets; beyond the paper.
 
     f = f_mf + f_rpv [(1 − t) D_s + t D_b], D_b = E[W T_out D_s T_in]/E[W] with the transmittances of flux
-    (docs/model.md, section 3): Helmholtz reciprocity holds for the whole Mueller matrix. Parameters are those of
-    :class:`DoubleGauss`.
+    (docs/model.md, section 3): Helmholtz reciprocity holds for the whole Mueller matrix. Parameters are those
+    of :class:`DoubleGauss`.
     """
 
     name: ClassVar[str] = "reciprocal-double-gauss"

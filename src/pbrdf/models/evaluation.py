@@ -61,7 +61,7 @@ def to_numpy(value: Any) -> np.ndarray | None:
 
 
 def kernel_from_angles(model: Model, theta_i: Any, theta_r: Any, phi: Any, values: Any, part: str) -> Any:
-    """Mueller matrix (nested lists) from angles, 0 at and below the horizon; over Dr.Jit floats, unchecked."""
+    """Mueller matrix (nested lists) from angles, 0 at and below the horizon; Dr.Jit floats, unchecked."""
     import drjit as dr
 
     visible = (dr.cos(theta_i) > _HORIZON) & (dr.cos(theta_r) > _HORIZON)
@@ -104,7 +104,9 @@ def check_incident(incident: Any) -> list[float]:
     except (TypeError, ValueError) as error:
         raise ModelError(f"incident={incident!r} is not a Stokes vector of four numbers") from error
     if S.shape[-1:] != (4,):
-        raise ModelError(f"incident has shape {S.shape}: a Stokes vector has four numbers in its last dimension")
+        raise ModelError(
+            f"incident has shape {S.shape}: a Stokes vector has four numbers in its last dimension"
+        )
     polarised = np.sqrt((S[..., 1:] ** 2).sum(-1))
     bad = ~(np.isfinite(S).all(-1) & (S[..., 0] > 0.0) & (polarised <= S[..., 0] * (1.0 + 1e-9)))
     if bad.any():
@@ -140,7 +142,9 @@ def _apply(matrix: Any, incident: Any) -> Any:
         import xarray as xr
 
         if not isinstance(incident, xr.DataArray):
-            raise ModelError("with xarray angles, give arrays of incident light as a DataArray over stokes_in")
+            raise ModelError(
+                "with xarray angles, give arrays of incident light as a DataArray over stokes_in"
+            )
         return xr.dot(matrix, incident, dim="stokes_in")
     return np.einsum("...ij,...j->...i", matrix, np.asarray(incident, dtype=float))
 
@@ -237,8 +241,11 @@ def _lane_groups(piece: dict[str, Any], size: int, model: Model, part: str) -> l
     if part == "specular" or model.chosen["accuracy"] == "high":
         return [None]
     sigma = np.asarray(piece["sigma"])
-    theta = np.maximum(piece["theta_i"], piece["theta_r"])
-    wedge = ~((sigma * CLEAR_WEDGE < 1.0 / np.tan(np.maximum(theta, 1e-6))) & (sigma <= SIGMA_25))
+    # zenith angle up to which the edge of the wedge lies farther out than CLEAR_WEDGE
+    limit = np.where(sigma <= SIGMA_25, np.arctan2(1.0, CLEAR_WEDGE * sigma), -1.0)
+    if all(np.max(piece[name]) < np.min(limit) for name in ("theta_i", "theta_r")):
+        return [None]
+    wedge = np.maximum(piece["theta_i"], piece["theta_r"]) >= limit
     wedge = np.broadcast_to(wedge, (size,))
     if wedge.all() or not wedge.any():
         return [None]
@@ -300,10 +307,12 @@ def _evaluate_xarray(
     result = xr.DataArray(
         data,
         dims=[*template.dims, *extra],
-        coords={**template.coords, **{name: STOKES for name in extra}},
+        coords={**template.coords, **dict.fromkeys(extra, STOKES)},
         name="mueller" if len(shape) == 2 else "stokes",
     )
-    result.attrs.update(units="1/sr", long_name="BRDF Mueller matrix" if len(shape) == 2 else "Stokes radiance")
+    result.attrs.update(
+        units="1/sr", long_name="BRDF Mueller matrix" if len(shape) == 2 else "Stokes radiance"
+    )
     return result
 
 
@@ -319,7 +328,8 @@ def _evaluate_drjit(
     given = [v for v in [*angles.values(), *model.values.values()] if is_drjit(v)]
     tensors = [v for v in given if dr.is_tensor_v(v)]
     Array = type(tensors[0].array) if tensors else type(given[0])
-    Float = dr.replace_type_t(Array, dr.VarType.Float32 if dr.type_v(Array) == dr.VarType.Float32 else dr.VarType.Float64)
+    single = dr.type_v(Array) == dr.VarType.Float32
+    Float: Any = dr.replace_type_t(Array, dr.VarType.Float32 if single else dr.VarType.Float64)
     for name, value in angles.items():
         if (content := to_numpy(value)) is not None:
             check_angles({name: content})
@@ -337,17 +347,18 @@ def _evaluate_drjit(
     kappa = to_numpy(model.values["kappa"])
     if kappa is not None and not kappa.any() and not dr.grad_enabled(values["kappa"]):
         values["kappa"] = None
-    f = kernel_from_angles(model, *(flatten(angles[k]) for k in ("theta_i", "theta_r", "phi")), values, part)
+    theta_i, theta_r, phi = (flatten(angles[name]) for name in ("theta_i", "theta_r", "phi"))
+    f = kernel_from_angles(model, theta_i, theta_r, phi, values, part)
     outputs = [Float(x) for x in function(f)]
+    module, suffix = sys.modules[Float.__module__], "" if single else "64"
     if grid is None:
-        module = sys.modules[Float.__module__]
-        suffix = "64" if dr.type_v(Float) == dr.VarType.Float64 else ""
         if len(shape) == 2:
             Matrix = getattr(module, f"Matrix4f{suffix}")
             return Matrix([[outputs[4 * i + j] for j in range(4)] for i in range(4)])
         return getattr(module, f"Array4f{suffix}")(outputs)
-    Tensor = dr.tensor_t(Float)
+    Tensor: Any = dr.tensor_t(Float)
     size = math.prod(grid)
-    flat = dr.zeros(Float, size * len(outputs))
-    dr.scatter(flat, get_backend().module.ArrayXf64(outputs), dr.arange(dr.uint32_array_t(Float), size))
+    flat: Any = dr.zeros(Float, size * len(outputs))
+    packets = getattr(module, f"ArrayXf{suffix}")(outputs)
+    dr.scatter(flat, packets, dr.arange(dr.uint32_array_t(Float), size))
     return Tensor(flat, (*grid, *shape))

@@ -59,7 +59,7 @@ def mueller_reflection(cos_beta: Any, n: Any, kappa: Any | None = None) -> Refle
     """
     c = cos_beta
     q, qi = refraction_root(c, n, kappa)
-    if qi is None:
+    if kappa is None or qi is None:
         r_s = (c - q) / (c + q)
         eps_c = n * n * c
         r_p = (eps_c - q) / (eps_c + q)
@@ -81,9 +81,7 @@ def mueller_reflection(cos_beta: Any, n: Any, kappa: Any | None = None) -> Refle
     )
 
 
-def transmittances(
-    cos_beta: Any, n: Any, kappa: Any | None = None, kind: str = "flux"
-) -> tuple[Any, Any]:
+def transmittances(cos_beta: Any, n: Any, kappa: Any | None = None, kind: str = "flux") -> tuple[Any, Any]:
     """Mean transmittance of a facet, and half the difference p − s over sin²β.
 
     Parameters
@@ -102,16 +100,20 @@ def transmittances(
         (T_p + T_s)/2 and (T_p − T_s)/(2 sin²β).
     """
     c = cos_beta
-    q, qi = refraction_root(c, n, kappa)
-    sin2 = dr.maximum(dr.fma(-c, c, 1.0), 0.0)
-    if qi is None:
+    sin2 = dr.fma(-c, c, 1.0)
+    if kappa is None:
+        # q² = ε − sin²β; T_s = 4cq/(c + q)² and T_p = T_s (1 + ratio² sin²β) with ratio = (ε − 1)/(εc + q)
+        # over one common denominator: one division for both
         eps = n * n
-        inv_s = dr.rcp(c + q)
-        inv_p = dr.rcp(dr.fma(eps, c, q))
-        T_s = 4.0 * q * (c if kind == "flux" else q) * inv_s * inv_s
-        ratio = (eps - 1.0) * inv_p  # T_p = T_s (1 + ratio² sin²β), from q² − ε c² = (ε − 1)(sin²β − c²)…
-        half = 0.5 * T_s * ratio * ratio
-        return dr.fma(half, sin2, T_s), half
+        q = dr.sqrt(dr.fma(c, c, eps - 1.0))
+        den_p = dr.fma(eps, c, q)
+        inverse = dr.rcp((c + q) * den_p)
+        common = 4.0 * q * (c if kind == "flux" else q) * (inverse * inverse)
+        half = 0.5 * (eps - 1.0) * (eps - 1.0) * common
+        return dr.fma(half, sin2, common * den_p * den_p), half
+    q, qi = refraction_root(c, n, kappa)
+    assert qi is not None
+    sin2 = dr.maximum(sin2, 0.0)
     den_s = dr.fma(c + q, c + q, qi * qi)
     if kind == "flux":
         T_s = 4.0 * c * q / den_s

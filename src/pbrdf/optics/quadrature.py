@@ -1,7 +1,7 @@
 """Averages over the facets that are lit and seen.
 
-P dω is exactly a Gaussian density in the facet's two slopes (docs/model.md, section 3), so an average over the
-facets is E[g(x, y); lit and seen] with m ∝ (x, y, 1) and x, y ~ N(0, σ²). "Lit" and "seen" are two
+P dω is exactly a Gaussian density in the facet's two slopes (docs/model.md, section 4), so an average over
+the facets is E[g(x, y); lit and seen] with m ∝ (x, y, 1) and x, y ~ N(0, σ²). "Lit" and "seen" are two
 half-planes in slope space, at c_i = cotθ_i/σ and c_r = cotθ_r/σ standard deviations from the origin.
 
 * Where both are far out (the paints below about 75°) a small cubature for the full Gaussian plane is
@@ -59,25 +59,24 @@ ACCURACIES: dict[str, _Accuracy] = {
 
 
 def _clear_rules() -> tuple[list[float], list[float], list[float]]:
-    """Nodes (in standard deviations) and weights of the 12-point rule, then of the 25-point rule."""
-    r = math.sqrt(6.0)
+    """Orbits of four nodes under quarter turns: one node (in standard deviations) and the weight of each.
+
+    First the three orbits of the 12-point rule, then the seven of the 25-point rule, whose centre counts as
+    an orbit of a quarter of its weight.
+    """
     s, t = (math.sqrt((9.0 - sign * 3.0 * math.sqrt(5.0)) / 4.0) for sign in (1.0, -1.0))
-    x = [r, -r, 0.0, 0.0]
-    y = [0.0, 0.0, r, -r]
-    w = [1.0 / 36.0] * 4
-    for value, weight in ((s, (5.0 + 2.0 * math.sqrt(5.0)) / 45.0), (t, (5.0 - 2.0 * math.sqrt(5.0)) / 45.0)):
-        x += [value, value, -value, -value]
-        y += [value, -value, value, -value]
-        w += [weight] * 4
+    x, y = [math.sqrt(6.0), s, t], [0.0, s, t]
+    w = [1.0 / 36.0, (5.0 + 2.0 * math.sqrt(5.0)) / 45.0, (5.0 - 2.0 * math.sqrt(5.0)) / 45.0]
     # Gauss-Hermite, five points, for the normal density: roots of He5 = z(z⁴ − 10z² + 15)
     inner, outer = math.sqrt(5.0 - math.sqrt(10.0)), math.sqrt(5.0 + math.sqrt(10.0))
     w_in, w_out = (7.0 + 2.0 * math.sqrt(10.0)) / 60.0, (7.0 - 2.0 * math.sqrt(10.0)) / 60.0
-    axis = [(-outer, w_out), (-inner, w_in), (0.0, 8.0 / 15.0), (inner, w_in), (outer, w_out)]
+    axis = [(0.0, 8.0 / 15.0), (inner, w_in), (outer, w_out)]
     for node_x, weight_x in axis:
         for node_y, weight_y in axis:
-            x.append(node_x)
-            y.append(node_y)
-            w.append(weight_x * weight_y)
+            if node_x > 0.0 or node_y == 0.0:
+                x.append(node_x)
+                y.append(node_y)
+                w.append(weight_x * weight_y * (0.25 if node_x == 0.0 else 1.0))
     return x, y, w
 
 
@@ -107,8 +106,8 @@ def facet_average(
     Parameters
     ----------
     integrand
-        ``integrand(m, mu_i, mu_r, geometry, args)`` returns a tuple of ``size`` floats: the values for the facet
-        normal m = (m_x, m_y, m_z), with the local cosines μ_i' = m·ω_i > 0 and μ_r' = m·ω_r > 0.
+        ``integrand(m, mu_i, mu_r, geometry, args)`` returns a tuple of ``size`` floats: the values for the
+        facet normal m = (m_x, m_y, m_z), with the local cosines μ_i' = m·ω_i > 0 and μ_r' = m·ω_r > 0.
     size
         Number of functions integrated.
     geometry, sigma
@@ -130,39 +129,50 @@ def facet_average(
     c_r = wedge_distance(geometry.cos_r, geometry.sin_r, sigma)
     zeros = [dr.zeros(F, 1) for _ in range(size)]
 
-    def add(total: Any, x: Any, y: Any, weight: Any, sigma: Any, geometry: Geometry, args: Any) -> list[Any]:
-        mx, my = x * sigma, y * sigma
-        inverse = dr.rsqrt(dr.fma(mx, mx, dr.fma(my, my, 1.0)))
-        m = (mx * inverse, my * inverse, inverse)
+    def add(total: Any, m: Any, weight: Any, geometry: Geometry, args: Any, check: bool) -> list[Any]:
         mu_i = dr.fma(m[0], geometry.omega_i[0], m[2] * geometry.omega_i[2])
-        mu_r = dr.fma(m[0], geometry.omega_r[0], dr.fma(m[1], geometry.omega_r[1], m[2] * geometry.omega_r[2]))
-        valid = (mu_i > 0.0) & (mu_r > 0.0)
-        values = integrand(m, dr.select(valid, mu_i, 1.0), dr.select(valid, mu_r, 1.0), geometry, args)
-        weight = dr.select(valid, weight, 0.0)
+        mu_r = dr.fma(
+            m[0], geometry.omega_r[0], dr.fma(m[1], geometry.omega_r[1], m[2] * geometry.omega_r[2])
+        )
+        if check:
+            valid = (mu_i > 0.0) & (mu_r > 0.0)
+            mu_i, mu_r = dr.select(valid, mu_i, 1.0), dr.select(valid, mu_r, 1.0)
+            weight = dr.select(valid, weight, 0.0)
+        values = integrand(m, mu_i, mu_r, geometry, args)
         return [dr.fma(weight, value, t) for value, t in zip(values, total, strict=True)]
 
     # the rule enters as data, so that all accuracies share one kernel
     rule = ACCURACIES[accuracy]
     step, steepness = F([rule.step]), F([rule.steepness])
+    flatness = dr.rcp(steepness)
     half, axis_nodes = F([float(rule.half)]), UInt([2 * rule.half + 1])
     wedge_lanes = needs_wedge(c_i, c_r, sigma) | (UInt([int(rule.clear)]) == 0)
     narrow = sigma <= SIGMA_12
-    offset = dr.select(narrow, UInt(0), UInt(12))
-    count = dr.select(wedge_lanes, UInt(0), dr.select(narrow, UInt(12), UInt(25)))
+    offset = dr.select(narrow, UInt(0), UInt(3))
+    count = dr.select(wedge_lanes, UInt(0), dr.select(narrow, UInt(3), UInt(7)))
     nodes = [F(column) for column in _RULES]
 
     def clear_body(j: Any, total: Any, sigma: Any, geometry: Any, args: Any) -> tuple[Any, ...]:
         x, y, weight = (dr.gather(F, column, offset + j, j < count) for column in nodes)
-        return j + 1, add(total, x, y, weight, sigma, geometry, args), sigma, geometry, args
+        mx, my = x * sigma, y * sigma
+        inverse = dr.rsqrt(dr.fma(mx, mx, dr.fma(my, my, 1.0)))
+        mx, my = mx * inverse, my * inverse
+        for m_x, m_y in ((mx, my), (-my, mx), (-mx, -my), (my, -mx)):
+            total = add(total, (m_x, m_y, inverse), weight, geometry, args, False)
+        return j + 1, total, sigma, geometry, args
 
     clear = dr.while_loop(
-        (UInt(0), zeros, sigma, geometry, args), lambda j, *_: j < count, clear_body, label="facets", max_iterations=-1
+        (UInt(0), zeros, sigma, geometry, args),
+        lambda j, *_: j < count,
+        clear_body,
+        label="facets",
+        max_iterations=-1,
     )[1]
     axes = _wedge_axes(geometry, c_i, c_r)
 
     def row_body(row: Any, total: Any, sigma: Any, geometry: Any, axes: Any, args: Any) -> tuple[Any, ...]:
         f, e, w_max, lower, upper = axes
-        w, dw = _squeeze_below((F(row) - half) * step, w_max, steepness)
+        w, dw = _squeeze_below((F(row) - half) * step, w_max, steepness, flatness)
         low = dr.clip(dr.fma(lower[1], w, lower[0]), -_FAR, _FAR)
         high = dr.maximum(dr.minimum(dr.fma(upper[1], w, upper[0]), _FAR), low)
         # (1 − exp(low − high)): with it the derivative of the map has no cancellation in a narrow interval
@@ -174,10 +184,11 @@ def facet_average(
         ) -> tuple[Any, ...]:
             f, e = axes
             w, low, high, row_weight = limits
-            v, dv = _squeeze_between((F(column) - half) * step, low, high, steepness)
+            v, dv = _squeeze_between((F(column) - half) * step, low, high, steepness, flatness)
             weight = row_weight * dv * dr.exp(-0.5 * v * v)
-            x, y = dr.fma(f[0], w, e[0] * v), dr.fma(f[1], w, e[1] * v)
-            total = add(total, x, y, weight, sigma, geometry, args)
+            x, y = sigma * dr.fma(f[0], w, e[0] * v), sigma * dr.fma(f[1], w, e[1] * v)
+            inverse = dr.rsqrt(dr.fma(x, x, dr.fma(y, y, 1.0)))
+            total = add(total, (x * inverse, y * inverse, inverse), weight, geometry, args, True)
             return column + 1, total, sigma, geometry, args, axes, limits
 
         columns = dr.while_loop(
@@ -201,16 +212,16 @@ def facet_average(
     return [a + b for a, b in zip(clear, wedge, strict=True)]
 
 
-def _squeeze_below(z: Any, high: Any, steepness: Any) -> tuple[Any, Any]:
+def _squeeze_below(z: Any, high: Any, steepness: Any, flatness: Any) -> tuple[Any, Any]:
     """Map z ∈ ℝ smoothly onto (−∞, high), the identity well inside; return the point and the derivative."""
     above = steepness * (z - high)
     e = dr.exp(-dr.abs(above))
     one_e = 1.0 + e
-    point = z - (dr.maximum(above, 0.0) + dr.log(one_e)) / steepness
+    point = z - (dr.maximum(above, 0.0) + dr.log(one_e)) * flatness
     return point, dr.select(above > 0.0, e, 1.0) / one_e
 
 
-def _squeeze_between(z: Any, low: Any, high: Any, steepness: Any) -> tuple[Any, Any]:
+def _squeeze_between(z: Any, low: Any, high: Any, steepness: Any, flatness: Any) -> tuple[Any, Any]:
     """Map z ∈ ℝ smoothly onto (low, high); return the point and the derivative over 1 − exp(low − high)."""
     below, above = steepness * (low - z), steepness * (z - high)
     e_below, e_above = dr.exp(-dr.abs(below)), dr.exp(-dr.abs(above))
@@ -219,7 +230,7 @@ def _squeeze_between(z: Any, low: Any, high: Any, steepness: Any) -> tuple[Any, 
     one_below = 1.0 + e_below
     bend = dr.maximum(below, 0.0) - dr.maximum(above, 0.0) + dr.log(one_below * ratio)
     inside = dr.select(below > 0.0, e_below, 1.0) * dr.select(above > 0.0, e_above, 1.0)
-    return z + bend / steepness, inside * ratio / one_below
+    return z + bend * flatness, inside * ratio / one_below
 
 
 def _wedge_axes(geometry: Geometry, c_i: Any, c_r: Any) -> tuple[Any, ...]:
@@ -238,7 +249,8 @@ def _wedge_axes(geometry: Geometry, c_i: Any, c_r: Any) -> tuple[Any, ...]:
     # e = ±(−f_y, f_x), the sign such that the farther edge bounds it from above
     turn = dr.select((sin_phi > 0.0) == nearer_i, -1.0, 1.0)
     e_same = (-turn * f_same[1], turn * f_same[0])
-    inverse = dr.rcp(dr.maximum(dr.abs(sin_phi), 1e-12))
+    clearance: Any = dr.maximum(dr.abs(sin_phi), 1e-12)
+    inverse = dr.rcp(clearance)
 
     # opposite sides: e ∝ a_i − a_r, f ∝ a_i + a_r towards the corner
     S = dr.sqrt(dr.maximum(0.5 * (1.0 - cos_d), 0.25))  # ≥ 0.5 wherever this branch is taken

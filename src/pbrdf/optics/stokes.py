@@ -1,8 +1,8 @@
 """Degree and angle of polarisation of Stokes vectors (I, Q, U, V) with Q = I_p − I_s.
 
-Each function takes a Stokes array of any kind and returns the same kind: NumPy arrays and sequences of shape
-(..., 4), xarray arrays with a dimension ``stokes_out`` (or ``stokes``), Dr.Jit ``Array4f`` values. Where I = 0 there
-is no light and the result is NaN.
+Each function takes a Stokes array of any kind and returns the same kind: NumPy arrays and sequences of
+shape (..., 4), xarray arrays with a dimension ``stokes_out`` (or ``stokes``), Dr.Jit ``Array4f`` values. Where
+I = 0 there is no light and the result is NaN.
 """
 
 from __future__ import annotations
@@ -61,7 +61,9 @@ def _components(stokes: Any) -> tuple[Any, Any, Any, Any]:
 
     array = np.asarray(stokes, dtype=float)
     if array.shape[-1:] != (4,):
-        raise ValueError(f"a Stokes array has four numbers in its last dimension, got the shape {array.shape}")
+        raise ValueError(
+            f"a Stokes array has four numbers in its last dimension, got the shape {array.shape}"
+        )
     return tuple(array[..., i] for i in range(4))  # type: ignore[return-value]
 
 

@@ -5,8 +5,8 @@ transmission at the local exit angle. The facets are averaged with the relative 
 W = [(μ_r' + μ_i') μ_r' μ_i']^(k−1) of local cosines. Only the first column of D_v is other than zero, because
 the body light is depolarised before it leaves (docs/model.md, section 3).
 
-Two readings of eq. (13) are kept (docs/model.md, section 3): ``weighted``, D_v = E[W M_t]/E[W], and ``visible``,
-D_v = E[W M_t]·∫dω/∫W dω with plain means over the lit and seen facets of the upper hemisphere.
+Two readings of eq. (13) are kept (docs/model.md, section 3): ``weighted``, D_v = E[W M_t]/E[W], and
+``visible``, D_v = E[W M_t]·∫dω/∫W dω with plain means over the lit and seen facets of the upper hemisphere.
 """
 
 from __future__ import annotations
@@ -22,7 +22,13 @@ from pbrdf.optics.fresnel import transmittances
 from pbrdf.optics.geometry import Geometry, dot
 from pbrdf.optics.quadrature import facet_average
 
-__all__ = ["NORMALIZATIONS", "TRANSMITTANCES", "exit_polarisation", "exit_and_entry_polarisation", "visible_means"]
+__all__ = [
+    "NORMALIZATIONS",
+    "TRANSMITTANCES",
+    "exit_and_entry_polarisation",
+    "exit_polarisation",
+    "visible_means",
+]
 
 NORMALIZATIONS = ("weighted", "visible")
 TRANSMITTANCES = ("flux", "amplitude")
@@ -74,8 +80,8 @@ def exit_and_entry_polarisation(
 ) -> list[list[Any]]:
     """3 x 3 block (I, Q, U) of D_b = E[W T_out D_s T_in]/E[W]: light enters and leaves through the facet.
 
-    Beyond the paper (docs/model.md, section 3): with the transmittance of flux on both ways and both frame rotations,
-    Helmholtz reciprocity holds for the whole Mueller matrix.
+    Beyond the paper (docs/model.md, section 3): with the transmittance of flux on both ways and both frame
+    rotations, Helmholtz reciprocity holds for the whole Mueller matrix.
     """
 
     def integrand(m: Any, mu_i: Any, mu_r: Any, geometry: Geometry, args: Any) -> tuple[Any, ...]:
@@ -121,9 +127,9 @@ def visible_means(geometry: Geometry, k: Any, accuracy: str = "default") -> tupl
 
     The first is the spherical triangle of three half-spaces, 2π − θ_i − θ_r − 2β. For the second, take lune
     coordinates about the half vector h, m = (cosλ cosψ, cosλ sinψ, sinλ) along h, q (in the plane of the two
-    rays) and h×q: (μ_i' + μ_r') μ_i' μ_r' = cos³λ · 2 cosβ cosψ cos(ψ−β) cos(ψ+β) (docs/model.md, section 3). The λ
-    integral from the horizon up is an incomplete beta function; the ψ integral is split where the horizon
-    crosses the plane of the rays and done by the tanh-sinh rule, which takes the algebraic end points.
+    rays) and h×q: (μ_i' + μ_r') μ_i' μ_r' = cos³λ · 2 cosβ cosψ cos(ψ−β) cos(ψ+β). The λ integral from the
+    horizon up is an incomplete beta function; the ψ integral is split where the horizon crosses the plane of
+    the rays and done by the tanh-sinh rule, which takes the algebraic end points.
     """
     F = type(k)
     UInt = dr.uint32_array_t(F)
@@ -152,7 +158,7 @@ def visible_means(geometry: Geometry, k: Any, accuracy: str = "default") -> tupl
     whole = 2.0 * (_from_zero(half_y, a, terms) + _to_one(half_y, a, terms))
 
     def body(j: Any, total: Any, state: Any) -> tuple[Any, ...]:
-        a, k, whole, beta, cos_beta, limit, crossing, h_z, q_z, s_z2 = state
+        a, k, whole, cos_beta, limit, crossing, h_z, q_z, s_z2 = state
         second = j >= count
         index = dr.select(second, j - count, j)
         x, weight = dr.gather(F, points, index), dr.gather(F, weights, index)
@@ -172,7 +178,7 @@ def visible_means(geometry: Geometry, k: Any, accuracy: str = "default") -> tupl
         shape = dr.exp((k - 1.0) * dr.log(dr.select(valid, product, 1.0)))
         return j + 1, dr.fma(dr.select(valid, weight * half_width, 0.0), shape * inner, total), state
 
-    state = (a, k, whole, beta, cos_beta, limit, crossing, h_z, q_z, s_z2)
+    state = (a, k, whole, cos_beta, limit, crossing, h_z, q_z, s_z2)
     integral = dr.while_loop(
         (UInt(0), dr.zeros(F, 1), state), lambda j, *_: j < 2 * count, body, label="lune", max_iterations=-1
     )[1]
