@@ -178,3 +178,54 @@ def test_lanes_may_have_bounds_of_their_own(noisy_exponentials):
         design = np.column_stack([np.exp(-held[lane] * x), np.ones_like(x)])
         expected = np.linalg.lstsq(design, y[lane], rcond=None)[0]
         np.testing.assert_allclose(solution.u[lane, [0, 2]], expected, rtol=1e-7)
+
+
+@pytest.mark.parametrize("loss", ["soft_l1", "huber", "cauchy"])
+def test_robust_losses_agree_with_scipy_and_resist_outliers(noisy_exponentials, loss):
+    x, y = noisy_exponentials
+    spoilt = y / 0.02
+    spoilt[:, 7] += 100.0
+    scale = 1.0 / 0.02
+    backend = get_backend()
+    data, abscissa = backend.upload(backend.Float, spoilt.ravel()), backend.upload(backend.Float, x)
+
+    def function(u, lane, point):
+        at = dr.gather(backend.Float, abscissa, point)
+        modelled = (u[0] * dr.exp(-u[1] * at) + u[2]) * scale
+        return [modelled - dr.gather(backend.Float, data, lane * 25 + point)], None
+
+    wide = np.full(3, -10.0), np.full(3, 10.0)
+    solution = solve(Residuals(function, 25, loss=loss), np.tile([1.0, 1.0, 0.0], (40, 1)), *wide)
+    for lane in (0, 11, 39):
+        peer = least_squares(
+            lambda u, lane=lane: exponential_residual(u, x, 0.0) * scale - spoilt[lane],
+            [1.0, 1.0, 0.0],
+            loss=loss,
+            xtol=1e-14,
+            ftol=1e-14,
+            gtol=1e-14,
+        )
+        np.testing.assert_allclose(solution.u[lane], peer.x, rtol=1e-5, atol=1e-6)
+        np.testing.assert_allclose(solution.cost[lane], peer.cost, rtol=1e-9)
+
+
+def test_a_gaussian_prior_counts_like_one_more_measurement(noisy_exponentials):
+    x, y = noisy_exponentials
+    problem = exponential_problem(y, x)
+
+    def penalty(u):
+        return [(1, (u[1] - 1.2) / 0.05, 1.0 / 0.05)]
+
+    with_prior = Residuals(problem.function, problem.points, penalty=penalty)
+    wide = np.full(3, -10.0), np.full(3, 10.0)
+    solution = solve(with_prior, np.tile([1.0, 1.0, 0.0], (40, 1)), *wide)
+    for lane in (0, 17):
+        peer = least_squares(
+            lambda u, lane=lane: np.append(exponential_residual(u, x, y[lane]), (u[1] - 1.2) / 0.05),
+            [1.0, 1.0, 0.0],
+            xtol=1e-14,
+            ftol=1e-14,
+            gtol=1e-14,
+        )
+        np.testing.assert_allclose(solution.u[lane], peer.x, rtol=1e-6)
+        np.testing.assert_allclose(solution.information[lane], peer.jac.T @ peer.jac, rtol=1e-4)

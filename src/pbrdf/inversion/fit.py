@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,11 +15,13 @@ from pbrdf.errors import FitError
 from pbrdf.inversion.clusters import cluster
 from pbrdf.inversion.holdout import HoldOut, Prediction, prediction_errors
 from pbrdf.inversion.noise import NoiseModel
+from pbrdf.inversion.nuisance import KINDS, Nuisance, check_prior
 from pbrdf.inversion.observations import Observations
-from pbrdf.inversion.problem import Space, residuals
-from pbrdf.inversion.solver import Solution, Status, solve
+from pbrdf.inversion.problem import Space, Term, predict
+from pbrdf.inversion.solver import LOSSES, Solution, Status
 from pbrdf.inversion.starts import sobol_starts
 from pbrdf.inversion.statistics import Goodness, covariance, goodness, prior_spread
+from pbrdf.inversion.strategy import STRATEGIES, Stage, facet_tilt, joint, stepwise
 from pbrdf.models import MODELS, DoubleGauss, Model
 from pbrdf.models.parameters import Parameter
 
@@ -110,6 +112,8 @@ class FitResult:
         What was held out, or None.
     notes
         Sentences about anything that a reader of the numbers must know.
+    stages
+        The steps of the fit, in order.
     start_values, end_values
         Where every start began and ended, free parameters in the model's order, shape (S, P).
     chi2_by_start
@@ -140,6 +144,7 @@ class FitResult:
     unknowns: np.ndarray = field(repr=False)
     information: np.ndarray = field(repr=False)
     notes: list[str] = field(default_factory=list)
+    stages: list[Stage] = field(default_factory=list)
     start_values: np.ndarray = field(default_factory=lambda: np.empty((0, 0)), repr=False)
     end_values: np.ndarray = field(default_factory=lambda: np.empty((0, 0)), repr=False)
     chi2_by_start: np.ndarray = field(default_factory=lambda: np.empty(0), repr=False)
@@ -155,6 +160,13 @@ def fit(
     free: Sequence[str] = (),
     bounds: Mapping[str, tuple[float, float]] | None = None,
     start: Mapping[str, float] | None = None,
+    priors: Mapping[str, tuple[float, float]] | None = None,
+    split: Mapping[str, str] | None = None,
+    nuisances: Sequence[Nuisance | str] = (),
+    strategy: str = "joint",
+    polish: bool = True,
+    diffuse_tilt: float | None = None,
+    loss: str = "linear",
     starts: int = 64,
     noise: NoiseModel | str | None = None,
     hold_out: HoldOut | str | None = None,
@@ -184,6 +196,21 @@ def fit(
         (lower, upper) of parameters, instead of the model's defaults.
     start
         Starting values: every start begins there in these parameters.
+    priors
+        Gaussian priors, (mean, standard deviation), on parameters of the model.
+    split
+        Parameters that are free for each ``"group"`` or each ``"wavelength"`` apart, for example
+        ``{"a": "wavelength"}``; all others are shared.
+    nuisances
+        What the instrument adds, :class:`~pbrdf.inversion.nuisance.Nuisance` or text like ``"gain:group"``.
+    strategy
+        ``"joint"``, or ``"stepwise"``: the paper's, see :mod:`pbrdf.inversion.strategy`.
+    polish
+        Whether ``"stepwise"`` ends with a joint fit of all parameters.
+    diffuse_tilt
+        For ``"stepwise"``: facet tilt in radians beyond which a geometry counts as diffuse; None takes 4.5 σ.
+    loss
+        ``"linear"`` (least squares), ``"soft_l1"``, ``"huber"`` or ``"cauchy"`` against outliers.
     starts
         Number of starts, spread over the bounds by a Sobol sequence.
     noise
@@ -214,10 +241,15 @@ def fit(
         hold_out = HoldOut.parse(hold_out)
     if starts < 1:
         raise FitError(f"starts={starts}: at least one start is needed")
+    if strategy not in STRATEGIES:
+        raise FitError(f"strategy={strategy!r}: choose one of {', '.join(STRATEGIES)}")
+    if loss not in LOSSES:
+        raise FitError(f"loss={loss!r}: choose one of {', '.join(LOSSES)}")
     observations = Observations.from_dataset(dataset, noise)
     held = hold_out.mask(dataset, seed) if hold_out else np.zeros(observations.values.shape[1], dtype=bool)
     fitted_data = observations.subset(~held)
     space, begin = _space(model, options or {}, fix or {}, free, bounds or {}, start or {}, fitted_data)
+    space = _with_terms(space, fitted_data, priors or {}, split or {}, nuisances, bounds or {}, loss)
     if fitted_data.count <= len(space.free):
         raise FitError(
             f"{fitted_data.count} measured values cannot determine {len(space.free)} parameters: measure "
@@ -228,45 +260,25 @@ def fit(
     first = first[np.argsort(first[:, 0])]  # neighbours alike: they then take the same branches
     _apply_starts(first, space, begin, start or {})
     clock = time.perf_counter()
-    solution = _search_and_refine(space, fitted_data, first, max_iterations, progress)
+    diffuse = None
+    if strategy == "joint":
+        solution, stages = joint(space, fitted_data, first, max_iterations, progress)
+    else:
+        solution, stages, used = stepwise(
+            space, fitted_data, first, max_iterations, progress, polish=polish, diffuse_tilt=diffuse_tilt
+        )
+        diffuse = np.zeros(len(held), dtype=bool)
+        diffuse[np.flatnonzero(~held)[used]] = True
     seconds = time.perf_counter() - clock
     if not np.isfinite(solution.cost).any():
         raise FitError("no start gave finite residuals: check the data's values and the bounds")
-    return _summarise(
+    result = _summarise(
         dataset, observations, fitted_data, held, space, solution, first, low, high, noise, hold_out, seconds
     )
-
-
-def _search_and_refine(
-    space: Space,
-    data: Observations,
-    first: np.ndarray,
-    max_iterations: int,
-    progress: Callable[[int, int], None] | None,
-) -> Solution:
-    """Search from all starts with the draft accuracy, then refine each distinct end with the model's own.
-
-    Every start gets the refined end of its cluster.
-    """
-    low, high = space.to_unknowns(space.lower), space.to_unknowns(space.upper)
-    search = solve(
-        residuals(space, [data], len(first), accuracy="draft"),
-        first,
-        low,
-        high,
-        max_iterations=max_iterations,
-        tolerance=1e-6,
-        progress=progress,
-    )
-    clusters = cluster(search.u, search.cost, high - low, 1e-3, 1e-3)
-    leaders = np.array([members[0] for members in clusters])
-    refined = solve(
-        residuals(space, [data], len(leaders)), search.u[leaders], low, high, max_iterations=max_iterations
-    )
-    cluster_of = np.empty(len(first), dtype=int)
-    for number, members in enumerate(clusters):
-        cluster_of[members] = number
-    return Solution(*(getattr(refined, f.name)[cluster_of] for f in fields(Solution)))
+    result.stages.extend(stages)
+    if diffuse is not None:
+        result.comparison["used_for_diffuse"] = ("geometry", diffuse)
+    return result
 
 
 def _space(
@@ -351,16 +363,94 @@ def _bounds(
     return p.lower, p.upper
 
 
+def _with_terms(
+    space: Space,
+    data: Observations,
+    priors: Mapping[str, tuple[float, float]],
+    split: Mapping[str, str],
+    nuisances: Sequence[Nuisance | str],
+    bounds: Mapping[str, tuple[float, float]],
+    loss: str,
+) -> Space:
+    """Add priors, parameters free for each group or wavelength, and nuisance terms."""
+    for what, given in (("prior", priors), ("split", split)):
+        for name in given:
+            if name not in space.names:
+                raise FitError(f"{what}: {name!r} is not a free parameter; free are {', '.join(space.names)}")
+    free: list[Parameter] = []
+    terms: list[Term] = []
+    lower: list[float] = []
+    upper: list[float] = []
+
+    given_terms = [Nuisance.parse(n) if isinstance(n, str) else n for n in nuisances]
+    with_gain = any(n.kind == "gain" for n in given_terms)
+    intensity = [data.values[c] for c, n in enumerate(data.channels) if n in ("I", "m00")]
+    positive = np.concatenate(intensity or [np.ones(1)])
+    typical = float(np.median(positive[positive > 0.0])) if (positive > 0.0).any() else 1.0
+
+    def add(p: Parameter, low: float, high: float, term: Term) -> None:
+        name = p.name if term.split is None else f"{p.name}[{_label_text(term.label)}]"
+        free.append(replace(p, name=name))
+        terms.append(term)
+        lower.append(low)
+        upper.append(high)
+
+    for p, low, high in zip(space.free, space.lower, space.upper, strict=True):
+        prior = priors.get(p.name)
+        check_prior(f"prior of {p.name}", prior)
+        if p.name == "a" and with_gain and "a" not in bounds:
+            low, high = 1e-3, 10.0  # the gain takes the scale of the data
+        for label in _labels(data, split.get(p.name), p.name):
+            add(p, low, high, Term(p.name, split.get(p.name), label, prior))
+    for nuisance in given_terms:
+        p = KINDS[nuisance.kind]
+        low, high = p.lower, p.upper
+        if nuisance.kind == "dark":
+            raw = typical / (float(np.median(data.scale)) if data.scale is not None else 1.0)
+            low, high = -raw, raw
+        elif nuisance.kind == "gain":
+            low, high = 0.01 * math.pi * typical, 100.0 * math.pi * typical
+        if any(t.role == nuisance.kind for t in terms):
+            raise FitError(f"nuisance {nuisance.kind} is given twice")
+        by = "group" if nuisance.per_group else None
+        for label in _labels(data, by, nuisance.kind):
+            add(p, low, high, Term(nuisance.kind, by, label, nuisance.prior))
+    return replace(
+        space, free=tuple(free), terms=tuple(terms), lower=np.array(lower), upper=np.array(upper), loss=loss
+    )
+
+
+def _labels(data: Observations, split: str | None, name: str) -> list[Any]:
+    if split is None:
+        return [None]
+    if split not in ("group", "wavelength"):
+        raise FitError(f"split: {name} can be free for each 'group' or 'wavelength', not for each {split!r}")
+    column = getattr(data, split)
+    labels = [] if column is None else list(np.unique(column))
+    if len(labels) < 2:
+        raise FitError(f"split: {name} is to be free for each {split}, but the fitted data have only one")
+    return labels
+
+
+def _label_text(label: Any) -> str:
+    return f"{label:g}" if isinstance(label, int | float | np.number) else str(label)
+
+
 def _apply_starts(
     first: np.ndarray, space: Space, begin: Mapping[str, float], start: Mapping[str, float]
 ) -> None:
-    """Put the user's starting values into the drawn ones, in place."""
+    """Put starting values of the user and of the nuisance terms into the drawn ones, in place."""
     values = space.to_parameters(first)
-    for i, p in enumerate(space.free):
-        if p.name in begin:
-            values[0, i] = min(max(begin[p.name], space.lower[i]), space.upper[i])
-        if p.name in start:
-            values[:, i] = start[p.name]
+    for i, term in enumerate(space.terms):
+        role = term.role
+        if role in begin:
+            values[0, i] = min(max(begin[role], space.lower[i]), space.upper[i])
+        if role in start:
+            values[:, i] = start[role]
+        elif role in KINDS and role != "gain":
+            # not 0 for the source: its effect is even in the radius, the derivative would vanish
+            default = 0.2 * space.upper[i] if role == "source" else KINDS[role].default
+            values[:, i] = term.prior[0] if term.prior else default
     first[:] = space.to_unknowns(values)
 
 
@@ -384,7 +474,7 @@ def _summarise(
     values = space.to_parameters(solution.u[best])
     values = np.clip(values, space.lower, space.upper)
     model = space.build(values)
-    comparison = compare(model, observations, dataset)
+    comparison = compare(model, observations, dataset, (space, space.to_unknowns(values)))
     comparison["held_out"] = ("geometry", held)
     near = comparison["facet_tilt"].values < math.atan(NEAR_SPECULAR * float(model.values["sigma"]))
     comparison["near_specular"] = ("geometry", near)
@@ -442,8 +532,23 @@ def _summarise(
     return result
 
 
-def compare(model: Model, observations: Observations, dataset: xr.Dataset) -> xr.Dataset:
+def compare(
+    model: Model,
+    observations: Observations,
+    dataset: xr.Dataset,
+    fitted: tuple[Space, np.ndarray] | None = None,
+) -> xr.Dataset:
     """Measured, modelled and residual values (model − measured) of every channel on the scale of a BRDF.
+
+    Parameters
+    ----------
+    model
+        The model.
+    observations, dataset
+        The same data in both forms.
+    fitted
+        Space and unknowns of a fit, whose nuisance terms and split parameters then count; without it the
+        model alone.
 
     Returns
     -------
@@ -454,13 +559,13 @@ def compare(model: Model, observations: Observations, dataset: xr.Dataset) -> xr
     """
     import xarray as xr
 
-    f = np.asarray(model.mueller(observations.theta_i, observations.theta_r, observations.phi))
-    S = f @ np.array(observations.illumination)
-    everything = {name: S[:, i] for i, name in enumerate("IQUV")}
-    everything |= {f"m{i}{j}": f[:, i, j] for i in range(4) for j in range(4)}
-    if observations.channels[0].startswith("m"):
-        everything["I"] = f[:, 0, 0]
-        everything["Q"], everything["U"] = f[:, 1, 0], f[:, 2, 0]
+    if fitted is None:
+        fitted = _trivial_space(model)
+    elements = observations.channels[0].startswith("m")
+    wanted = tuple(dict.fromkeys((*observations.channels, *(("m00", "m10", "m20") if elements else "IQU"))))
+    everything = predict(*fitted, observations, wanted)
+    if elements:
+        everything |= {"I": everything["m00"], "Q": everything["m10"], "U": everything["m20"]}
     with np.errstate(divide="ignore", invalid="ignore"):
         everything["dolp"] = np.hypot(everything["Q"], everything["U"]) / everything["I"]
     present = np.isfinite(observations.std)
@@ -472,10 +577,12 @@ def compare(model: Model, observations: Observations, dataset: xr.Dataset) -> xr
     if "m00" in measured:
         measured["I"], std["I"] = measured["m00"], std["m00"]
     if "dolp" not in measured:
-        I, Q, U = (measured.get(a, measured.get(b)) for a, b in (("I", "m00"), ("Q", "m10"), ("U", "m20")))
-        if I is not None and Q is not None:
+        intensity, q, u = (
+            measured.get(a, measured.get(b)) for a, b in (("I", "m00"), ("Q", "m10"), ("U", "m20"))
+        )
+        if intensity is not None and q is not None:
             with np.errstate(divide="ignore", invalid="ignore"):
-                measured["dolp"] = np.hypot(Q, 0.0 if U is None else U) / I
+                measured["dolp"] = np.hypot(q, 0.0 if u is None else u) / intensity
     result = xr.Dataset(
         coords={name: dataset[name] for name in dataset.coords if name not in ("stokes_out", "stokes_in")}
     )
@@ -488,11 +595,18 @@ def compare(model: Model, observations: Observations, dataset: xr.Dataset) -> xr
             columns["std"] = np.where(np.isfinite(std[name]), std[name], np.nan)
         for kind, column in columns.items():
             result[f"{name}_{kind}"] = ("geometry", column, {"units": unit})
-    si, sr = np.sin(observations.theta_i), np.sin(observations.theta_r)
-    across = np.hypot(sr * np.cos(observations.phi) - si, sr * np.sin(observations.phi))
-    tilt = np.arctan2(across, np.cos(observations.theta_i) + np.cos(observations.theta_r))
+    tilt = facet_tilt(observations.theta_i, observations.theta_r, observations.phi)
     result["facet_tilt"] = ("geometry", tilt, {"units": "rad"})
     return result
+
+
+def _trivial_space(model: Model) -> tuple[Space, np.ndarray]:
+    """A space in which only σ is free, at the model's own value."""
+    first, *others = model.parameters
+    value = np.array([float(model.values[first.name])])
+    fixed = {p.name: float(model.values[p.name]) for p in others}
+    space = Space(type(model), model.chosen, (first,), fixed, value, value)
+    return space, space.to_unknowns(value)
 
 
 def _estimates(
@@ -518,13 +632,12 @@ def _estimates(
     error[inside] = np.sqrt(np.diag(cov))
     undetermined = error >= prior
     slope = space.derivative(values)
-    estimates = {}
-    for p in space.model.parameters:
-        if p.name in space.fixed:
-            value = space.fixed[p.name]
-            estimates[p.name] = Estimate(p, value, math.nan, value, value, "fixed")
-            continue
-        i = space.names.index(p.name)
+    estimates = {
+        p.name: Estimate(p, value, math.nan, value, value, "fixed")
+        for p in space.model.parameters
+        if (value := space.fixed.get(p.name)) is not None
+    }
+    for i, p in enumerate(space.free):
         std = float(error[i] * slope[i])
         if at_low[i]:
             verdict, std = "at lower bound", math.nan
@@ -537,6 +650,10 @@ def _estimates(
         estimates[p.name] = Estimate(
             p, float(values[i]), std, float(space.lower[i]), float(space.upper[i]), verdict
         )
+    order = {p.name: k for k, p in enumerate(space.model.parameters)}
+    estimates = dict(
+        sorted(estimates.items(), key=lambda item: order.get(item[0].partition("[")[0], len(order)))
+    )
     scale = np.sqrt(np.diag(cov))
     correlation = cov / np.outer(scale, scale) if len(inside) else cov
     return estimates, ([space.names[i] for i in inside], correlation)

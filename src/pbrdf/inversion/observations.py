@@ -37,6 +37,10 @@ class Observations:
         Stokes vector of the source.
     std_known
         Whether every standard uncertainty comes from the data set; if not, their scale is a guess.
+    group, wavelength
+        Labels and wavelengths (nm) of the geometries, shape (G,); None where there are none.
+    scale
+        Factor that brought the data to the scale of a BRDF, shape (G,); None for 1.
     """
 
     theta_i: np.ndarray
@@ -47,6 +51,9 @@ class Observations:
     std: np.ndarray
     illumination: tuple[float, float, float, float]
     std_known: bool
+    group: np.ndarray | None = None
+    wavelength: np.ndarray | None = None
+    scale: np.ndarray | None = None
 
     @classmethod
     def from_dataset(cls, ds: xr.Dataset, noise: NoiseModel | None = None) -> Observations:
@@ -67,6 +74,12 @@ class Observations:
         FitError
             If nothing was measured.
         """
+        quantity = ds.attrs["quantity"]
+        scale = np.ones(ds.sizes["geometry"])
+        if quantity == "reflectance_factor":
+            scale /= np.pi
+        elif quantity != "brdf":
+            scale /= np.cos(ds["theta_i"].values)
         ds = to_brdf_scale(ds)
         measured = measured_channels(ds)
         if not measured:
@@ -114,6 +127,9 @@ class Observations:
             std=np.where(absent, np.inf, std),
             illumination=tuple(float(v) for v in ds.attrs["illumination"]),  # type: ignore[arg-type]
             std_known=known,
+            group=ds["group"].values,
+            wavelength=ds["wavelength"].values if "wavelength" in ds.coords else None,
+            scale=scale,
         )
 
     @property
@@ -142,6 +158,7 @@ class Observations:
             self.std[:, keep],
             self.illumination,
             self.std_known,
+            *(None if a is None else a[keep] for a in (self.group, self.wavelength, self.scale)),
         )
 
 

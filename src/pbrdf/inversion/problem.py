@@ -1,8 +1,7 @@
-"""A model and observations as a least-squares problem: which parameters are free, and the residuals."""
+"""A model and observations as a least-squares problem: which unknowns there are, and the residuals."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -11,13 +10,35 @@ import numpy as np
 
 from pbrdf.backend import get_backend
 from pbrdf.errors import FitError
+from pbrdf.inversion.forward import channel_values, measured_mueller
 from pbrdf.inversion.observations import Observations
 from pbrdf.inversion.solver import Residuals
 from pbrdf.models.base import Model
-from pbrdf.models.evaluation import kernel_from_angles
 from pbrdf.models.parameters import Parameter
 
-__all__ = ["Space", "residuals"]
+__all__ = ["Space", "Term", "predict", "residuals"]
+
+
+@dataclass(frozen=True)
+class Term:
+    """What one unknown stands for.
+
+    Attributes
+    ----------
+    role
+        Parameter of the model, or kind of nuisance, whose value it is.
+    split
+        ``"group"`` or ``"wavelength"`` if it counts for some geometries only; else None.
+    label
+        The group or wavelength that it counts for.
+    prior
+        Mean and standard deviation of a Gaussian prior on the value; None for none.
+    """
+
+    role: str
+    split: str | None = None
+    label: Any = None
+    prior: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -33,11 +54,16 @@ class Space:
     options
         Options of the model.
     free
-        The free parameters, in the model's order.
+        The free parameters: the model's in its order, then nuisance terms. A parameter that is free for each
+        group or wavelength stands here once for each, as ``a[550]``.
     fixed
-        Values of all others by name.
+        Values of all other parameters of the model by name.
     lower, upper
         Bounds of the free parameters, in their own units, shape (P,).
+    terms
+        What each free parameter stands for; empty where each is a parameter of the model for all data.
+    loss
+        Loss of the residuals, see :data:`pbrdf.inversion.solver.LOSSES`.
     """
 
     model: type[Model]
@@ -46,6 +72,12 @@ class Space:
     fixed: Mapping[str, float]
     lower: np.ndarray
     upper: np.ndarray
+    terms: tuple[Term, ...] = ()
+    loss: str = "linear"
+
+    def __post_init__(self) -> None:
+        if not self.terms:
+            object.__setattr__(self, "terms", tuple(Term(p.name) for p in self.free))
 
     @property
     def names(self) -> list[str]:
@@ -76,10 +108,25 @@ class Space:
                 result[..., i] = values[..., i]
         return result
 
-    def build(self, values: Sequence[float] | np.ndarray) -> Model:
-        """The model with the free parameters set to ``values``."""
-        named = dict(zip(self.names, (float(v) for v in values), strict=True))
+    def build(self, values: Sequence[float] | np.ndarray, label: Any = None) -> Model:
+        """The model with the free parameters set to ``values``.
+
+        Where a parameter is free for each group or wavelength, that of ``label`` counts, or the first.
+        """
+        named: dict[str, float] = {}
+        for term, value in zip(self.terms, values, strict=True):
+            if term.role in self.model_names and (term.role not in named or term.label == label):
+                named[term.role] = float(value)
         return self.model.from_values({**self.fixed, **named}, **self.options)
+
+    @property
+    def model_names(self) -> list[str]:
+        """Names of the model's parameters."""
+        return [p.name for p in self.model.parameters]
+
+    def labels(self, split: str) -> list[Any]:
+        """The groups or wavelengths that have unknowns of their own."""
+        return list(dict.fromkeys(term.label for term in self.terms if term.split == split))
 
 
 def residuals(
@@ -94,7 +141,8 @@ def residuals(
     space
         Free and fixed parameters.
     data
-        Data sets with the same channels, number of geometries and illumination; angles may differ.
+        Data sets with the same channels, number of geometries and illumination; angles may differ, groups and
+        wavelengths may not.
     starts
         Number of lanes for each data set.
     accuracy
@@ -116,78 +164,153 @@ def residuals(
     backend = get_backend()
     Float, UInt32 = backend.Float, backend.UInt32
     points = first.values.shape[1]
-    same_angles = all(
-        np.array_equal(getattr(o, name), getattr(first, name))
-        for o in data[1:]
-        for name in ("theta_i", "theta_r", "phi")
+    signals = _Signals(space, data, accuracy)
+    measured, weights = (
+        [
+            backend.upload(Float, np.concatenate([getattr(o, what)[c] for o in data]))
+            for c in range(len(first.channels))
+        ]
+        for what in ("values", "weights")
     )
-
-    def upload(arrays: list[np.ndarray]) -> Any:
-        return backend.upload(Float, np.concatenate(arrays))
-
-    angle_sets = data[:1] if same_angles else data
-    angles = [upload([getattr(o, name) for o in angle_sets]) for name in ("theta_i", "theta_r", "phi")]
-    measured = [upload([o.values[c] for o in data]) for c in range(len(first.channels))]
-    weights = [upload([o.weights[c] for o in data]) for c in range(len(first.channels))]
-    fixed = {name: dr.opaque(Float, value) for name, value in space.fixed.items()}
-    dielectric = space.fixed.get("kappa") == 0.0
-    model = space.build(space.lower)  # only its kernel and options are used
-    if accuracy is not None:
-        model = model.replace(accuracy=accuracy)
-    incident = first.illumination
     divisor = dr.opaque(UInt32, starts)
     stride = dr.opaque(UInt32, points)
-    angle_stride = dr.opaque(UInt32, 0 if same_angles else points)
 
     def function(u: list[Any], lane: Any, point: Any) -> tuple[list[Any], Any]:
-        values: dict[str, Any] = dict(fixed)
-        for p, unknown in zip(space.free, u, strict=True):
-            values[p.name] = dr.exp(unknown) if p.logarithmic else unknown
-        if dielectric:
-            values["kappa"] = None
         number = lane // divisor
-        at = number * angle_stride + point
-        theta_i, theta_r, phi = (dr.gather(Float, a, at) for a in angles)
-        f = kernel_from_angles(model, theta_i, theta_r, phi, values, "total")
-        modelled = channel_values(f, first.channels, incident)
+        modelled, alive = signals(u, number, point, first.channels)
         at = number * stride + point
         weighted = [
             (m - dr.gather(Float, y, at)) * dr.gather(Float, w, at)
             for m, y, w in zip(modelled, measured, weights, strict=True)
         ]
-        return weighted, f
+        return weighted, alive
 
-    return Residuals(function, points)
+    return Residuals(function, points, _penalty(space), space.loss)
 
 
-def channel_values(f: Any, channels: Sequence[str], incident: Sequence[float]) -> list[Any]:
-    """The channels of :class:`Observations` from a Mueller matrix over Dr.Jit floats."""
+def predict(
+    space: Space, unknowns: np.ndarray, data: Observations, channels: Sequence[str]
+) -> dict[str, np.ndarray]:
+    """Modelled values of any channels at the geometries of a data set, nuisance terms included.
+
+    Parameters
+    ----------
+    space
+        Free and fixed parameters.
+    unknowns
+        The solver's unknowns, shape (P,).
+    data
+        Geometries and illumination.
+    channels
+        ``I``, ``Q``, ``U``, ``V``, ``dolp`` or ``m00`` … ``m33``.
+
+    Returns
+    -------
+    dict
+        Arrays of shape (G,) by channel.
+    """
     import drjit as dr
 
-    def stokes(i: int) -> Any:
-        total: Any = 0.0
-        for j in range(4):
-            if incident[j] != 0.0 and not (isinstance(f[i][j], float) and f[i][j] == 0.0):
-                total = total + f[i][j] * incident[j]
-        return total
-
-    values = []
-    for name in channels:
-        if name.startswith("m"):
-            values.append(f[int(name[1])][int(name[2])])
-        elif name == "dolp":
-            # the tiny offset keeps the derivative finite where Q = U = 0
-            values.append(dr.sqrt(dr.square(stokes(1)) + dr.square(stokes(2)) + 1e-24) / stokes(0))
-        else:
-            values.append(stokes("IQUV".index(name)))
-    return values
+    backend = get_backend()
+    size = len(data.theta_i)
+    point = dr.arange(backend.UInt32, size)
+    u = [dr.opaque(backend.Float, float(v), size) for v in unknowns]
+    values, _ = _Signals(space, [data], None)(u, dr.zeros(backend.UInt32, size), point, channels)
+    arrays = [backend.Float(v) + dr.zeros(backend.Float, size) for v in values]
+    dr.eval(arrays)
+    return {name: array.numpy() for name, array in zip(channels, arrays, strict=True)}
 
 
-def search_box(space: Space) -> tuple[np.ndarray, np.ndarray]:
-    """Bounds of the solver's unknowns, shape (P,) each."""
-    return space.to_unknowns(space.lower), space.to_unknowns(space.upper)
+class _Signals:
+    """Channels modelled at one point of one data set, over Dr.Jit floats."""
+
+    def __init__(self, space: Space, data: Sequence[Observations], accuracy: str | None) -> None:
+        import drjit as dr
+
+        backend = get_backend()
+        self.Float, self.UInt32 = backend.Float, backend.UInt32
+        self.space, self.incident = space, data[0].illumination
+        model = space.build(space.lower)  # only its kernel and options are used
+        self.model = model if accuracy is None else model.replace(accuracy=accuracy)
+        self.fixed = {name: dr.opaque(self.Float, value) for name, value in space.fixed.items()}
+        self.dielectric = space.fixed.get("kappa") == 0.0
+        first = data[0]
+        size = len(first.theta_i)
+        names = ("theta_i", "theta_r", "phi")
+        same = all(np.array_equal(getattr(o, n), getattr(first, n)) for o in data[1:] for n in names)
+        self.stride = dr.opaque(self.UInt32, 0 if same else size)
+
+        def upload(column: str) -> Any:
+            arrays = [getattr(o, column) for o in (data[:1] if same else data)]
+            return backend.upload(self.Float, np.concatenate(arrays))
+
+        self.angles = [upload(name) for name in names]
+        roles = {term.role for term in space.terms}
+        if "angle" in roles and any((np.abs(np.sin(o.phi)) > 1e-6).any() for o in data):
+            raise FitError("nuisance angle: it needs data in the plane of incidence (phi 0° or 180°)")
+        self.scale = None
+        if "dark" in roles:
+            scale = np.ones(size) if first.scale is None else first.scale
+            self.scale = backend.upload(self.Float, scale)
+        self.label_index = {
+            split: backend.upload(self.UInt32, _label_index(first, split, labels))
+            for split in ("group", "wavelength")
+            if (labels := space.labels(split))
+        }
+
+    def __call__(
+        self, u: list[Any], number: Any, point: Any, channels: Sequence[str]
+    ) -> tuple[list[Any], Any]:
+        import drjit as dr
+
+        roles: dict[str, Any] = dict(self.fixed)
+        shared: dict[str, list[Any]] = {}
+        for term, unknown in zip(self.space.terms, u, strict=True):
+            shared.setdefault(term.role, []).append(unknown)
+        logarithmic = {
+            term.role: p.logarithmic for term, p in zip(self.space.terms, self.space.free, strict=True)
+        }
+        for role, unknowns in shared.items():
+            # a group or wavelength without an unknown of its own (held out) gets the mean of the others
+            mean = sum(unknowns[1:], unknowns[0]) / len(unknowns) if len(unknowns) > 1 else unknowns[0]
+            roles[role] = dr.exp(mean) if logarithmic[role] else mean
+        for term, unknown in zip(self.space.terms, u, strict=True):
+            if term.split is not None:
+                value = dr.exp(unknown) if logarithmic[term.role] else unknown
+                index = dr.gather(self.UInt32, self.label_index[term.split], point)
+                chosen = index == self.space.labels(term.split).index(term.label)
+                roles[term.role] = dr.select(chosen, value, roles[term.role])
+        if self.dielectric:
+            roles["kappa"] = None
+        at = number * self.stride + point
+        theta_i, theta_r, phi = (dr.gather(self.Float, a, at) for a in self.angles)
+        f, alive = measured_mueller(self.model, roles, theta_i, theta_r, phi)
+        dark = roles["dark"] * dr.gather(self.Float, self.scale, point) if "dark" in roles else None
+        return channel_values(f, channels, self.incident, roles.get("gain"), dark), (alive, f)
 
 
-def is_finite_box(lower: float, upper: float) -> bool:
-    """Whether two bounds are finite and in order."""
-    return math.isfinite(lower) and math.isfinite(upper) and lower < upper
+def _label_index(data: Observations, split: str, labels: list[Any]) -> np.ndarray:
+    """Position of each geometry's label among those that have unknowns of their own, or their number."""
+    index = np.full(len(data.theta_i), len(labels), dtype=np.uint32)
+    for position, label in enumerate(labels):
+        index[getattr(data, split) == label] = position
+    return index
+
+
+def _penalty(space: Space) -> Any:
+    """Residuals of the priors, or None."""
+    if all(term.prior is None for term in space.terms):
+        return None
+
+    def penalty(u: list[Any]) -> list[tuple[int, Any, Any]]:
+        import drjit as dr
+
+        found = []
+        for i, (term, p) in enumerate(zip(space.terms, space.free, strict=True)):
+            if term.prior is not None:
+                mean, weight = term.prior[0], 1.0 / term.prior[1]
+                value = dr.exp(u[i]) if p.logarithmic else u[i]
+                found.append((i, (value - mean) * weight, value * weight if p.logarithmic else weight))
+        return found
+
+    return penalty

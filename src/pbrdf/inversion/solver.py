@@ -23,7 +23,7 @@ import numpy as np
 
 from pbrdf.backend import get_backend
 
-__all__ = ["Residuals", "Solution", "Status", "solve"]
+__all__ = ["LOSSES", "Residuals", "Solution", "Status", "solve"]
 
 #: Iterations of one kernel launch, after which stopped lanes leave the batch. A batch of at most SMALL_BATCH
 #: lanes runs to its end in one launch: recording the kernel anew would take longer than idle lanes do.
@@ -31,6 +31,35 @@ ROUNDS, SMALL_BATCH = 6, 1024
 
 #: How often a step is solved again with the unknowns that would cross a bound held on it.
 BOUND_PASSES = 2
+
+
+def _soft_l1(z: Any) -> tuple[Any, Any]:
+    import drjit as dr
+
+    root = dr.sqrt(1.0 + z)
+    return 2.0 * (root - 1.0), 1.0 / root
+
+
+def _huber(z: Any) -> tuple[Any, Any]:
+    import drjit as dr
+
+    root = dr.sqrt(dr.maximum(z, 1.0))
+    return dr.select(z <= 1.0, z, 2.0 * root - 1.0), 1.0 / root
+
+
+def _cauchy(z: Any) -> tuple[Any, Any]:
+    import drjit as dr
+
+    return dr.log(1.0 + z), 1.0 / (1.0 + z)
+
+
+#: Losses ρ(z) of z = r², with their derivative ρ', as in SciPy's ``least_squares``.
+LOSSES: dict[str, Callable[[Any], tuple[Any, Any]]] = {
+    "linear": lambda z: (z, 1.0),
+    "soft_l1": _soft_l1,
+    "huber": _huber,
+    "cauchy": _cauchy,
+}
 
 
 class Status(enum.IntEnum):
@@ -52,7 +81,7 @@ class Status(enum.IntEnum):
 
 @dataclass(frozen=True)
 class Residuals:
-    """What the solver minimises: ½ Σ r² over the points of a lane.
+    """What the solver minimises: ½ Σ ρ(r²) over the points of a lane, plus ½ Σ of squared penalties.
 
     Attributes
     ----------
@@ -63,10 +92,17 @@ class Residuals:
         ``lane`` and ``point`` are uint32 indices.
     points
         Number of points that every lane runs over.
+    penalty
+        ``penalty(u)`` returns triples (i, r, dr/du_i) of residuals that depend on one unknown each: Gaussian
+        priors. They are not subject to the loss.
+    loss
+        ρ: one of ``LOSSES``; r is in standard deviations, so a loss departs from squares at about 1.
     """
 
     function: Callable[[list[Any], Any, Any], tuple[Sequence[Any], Any]]
     points: int
+    penalty: Callable[[list[Any]], list[tuple[int, Any, Any]]] | None = None
+    loss: str = "linear"
 
 
 @dataclass(frozen=True)
@@ -372,9 +408,17 @@ def _normal_equations(residuals: Residuals, u: list[Any], lane: Any) -> tuple[An
             dr.clear_grad(v)
         del alive
         r = [dr.detach(x) for x in r]
-        A = [a + _inner(J[i], J[j]) for a, (i, j) in zip(A, triangle, strict=True)]
-        g = [b + _inner(J[i], r) for i, b in enumerate(g)]
-        return point + 1, u, lane, cost + 0.5 * _inner(r, r), A, g
+        if residuals.loss == "linear":
+            cost = cost + 0.5 * _inner(r, r)
+            weighted = J
+        else:
+            # Gauss-Newton for a loss: the gradient is exact, JᵀJ takes the weights ρ' without their derivative
+            losses = [LOSSES[residuals.loss](x * x) for x in r]
+            cost = cost + 0.5 * sum(value for value, _ in losses)
+            weighted = [[x * slope for x, (_, slope) in zip(column, losses, strict=True)] for column in J]
+        A = [a + _inner(weighted[i], J[j]) for a, (i, j) in zip(A, triangle, strict=True)]
+        g = [b + _inner(weighted[i], r) for i, b in enumerate(g)]
+        return point + 1, u, lane, cost, A, g
 
     zero = Float(0.0)
     with dr.suspend_grad():
@@ -386,7 +430,13 @@ def _normal_equations(residuals: Residuals, u: list[Any], lane: Any) -> tuple[An
         mode="symbolic",
         label="points",
     )
-    return out[3], out[4], out[5]
+    cost, A, g = out[3], out[4], out[5]
+    if residuals.penalty is not None:
+        for i, r, slope in residuals.penalty(u):
+            cost = cost + 0.5 * r * r
+            A[triangle.index((i, i))] = A[triangle.index((i, i))] + slope * slope
+            g[i] = g[i] + slope * r
+    return cost, A, g
 
 
 def _inner(a: Sequence[Any], b: Sequence[Any]) -> Any:

@@ -1,0 +1,345 @@
+"""Whether a fitted model is physically plausible, and how far its data carry it.
+
+A small residual does not make a model physical. Checked here: it must not reflect more than it receives, its
+Mueller matrices must be those of a passive surface, its parameters should not stand at bounds, and predictions
+beyond the measured directions are extrapolation. What the numbers mean: ``docs/validation.md``.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pbrdf.errors import ModelError
+from pbrdf.models.base import Model
+from pbrdf.optics.mueller import coherency_eigenvalues
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from pbrdf.inversion.fit import FitResult
+
+__all__ = [
+    "Finding",
+    "Severity",
+    "directional_hemispherical_reflectance",
+    "least_coherency",
+    "plausibility",
+]
+
+#: Nodes of the specular integral: radius, in standard deviations of slope, up to REACH, and direction.
+RADII, DIRECTIONS, REACH = 128, 96, 8.0
+#: Nodes of the diffuse integral: √cosθ_r and azimuth.
+ZENITHS, AZIMUTHS = 64, 32
+#: Incidence angles at which the energy balance of a fit is checked, degrees.
+INCIDENCES = tuple(range(0, 86, 5))
+#: Directional-hemispherical reflectances up to this much above 1 count as 1: the accuracy of the integral.
+ENERGY_TOLERANCE = 1e-3
+#: Coherency eigenvalues down to this, in units of f00, count as 0: rounding.
+COHERENCY_TOLERANCE = 1e-9
+#: Facets tilted by at most this many σ from the mirror direction sample the lobe; fewer points than
+#: LOBE_POINTS cannot show its height and its width.
+LOBE_WIDTHS, LOBE_POINTS = 2.0, 3
+
+
+class Severity(enum.StrEnum):
+    """How serious a finding is."""
+
+    OK = "ok"  # checked, nothing to object
+    NOTE = "note"  # worth knowing
+    WARNING = "warning"  # numbers that rest on little
+    VIOLATION = "violation"  # no passive surface does this
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One result of :func:`plausibility`.
+
+    Attributes
+    ----------
+    check
+        ``"energy"``, ``"realisability"``, ``"parameters"``, ``"range"`` or ``"lobe"``.
+    severity
+        How serious it is.
+    sentence
+        What was found, in words.
+    """
+
+    check: str
+    severity: Severity
+    sentence: str
+
+
+def plausibility(result: FitResult, dataset: xr.Dataset | None = None) -> list[Finding]:
+    """Check a fit for what no residual shows.
+
+    Parameters
+    ----------
+    result
+        The fit.
+    dataset
+        The fitted data set. Its attributes say whether its values are on an absolute scale; without it those of
+        ``result.comparison`` are asked. On an arbitrary scale the energy balance cannot be checked.
+
+    Returns
+    -------
+    list of Finding
+        The energy balance and realisability first, then parameters, lobe and measured range; never empty.
+    """
+    attributes = {**result.comparison.attrs, **(dataset.attrs if dataset is not None else {})}
+    return [
+        _energy(result, attributes),
+        _realisability(result.model),
+        *_parameters(result),
+        _lobe(result),
+        *_range(result),
+    ]
+
+
+def directional_hemispherical_reflectance(model: Model, theta_i: ArrayLike) -> np.ndarray:
+    """Share of natural light from one direction that a surface reflects into the hemisphere.
+
+    DHR(θ_i) = ∫ f00 cosθ_r dω_r. The specular part is integrated over the facet slopes, in which its lobe is a
+    Gaussian of width σ whatever σ and θ_i are; the diffuse part over the direction of view, with nodes that
+    crowd towards grazing, where cosθ_r^(k−1) is singular for k < 1.
+
+    Parameters
+    ----------
+    model
+        A model of single parameters (no maps) with a slope standard deviation ``sigma``.
+    theta_i
+        Zenith angles of the source in radians, within [0, π/2); any shape.
+
+    Returns
+    -------
+    ndarray
+        Dimensionless, of the shape of ``theta_i``. Accurate to 1e-3, and to 1e-6 where horizon and shadowing do not
+        cut into the lobe (σ ≤ 0.1 and θ_i ≤ 60°).
+
+    Raises
+    ------
+    ModelError
+        If an angle is out of range or the model's parameters are arrays.
+    """
+    angles = np.asarray(theta_i, dtype=float)
+    if not ((angles >= 0.0) & (angles < 0.5 * math.pi)).all():
+        raise ModelError(
+            "theta_i must be within [0, π/2) radians for a directional-hemispherical reflectance"
+        )
+    if any(np.ndim(value) for value in model.values.values()):
+        raise ModelError(
+            "the directional-hemispherical reflectance needs a model of single parameters, no maps"
+        )
+    flat = angles.ravel()
+    return (_specular_reflectance(model, flat) + _diffuse_reflectance(model, flat)).reshape(angles.shape)
+
+
+def _specular_reflectance(model: Model, theta_i: np.ndarray) -> np.ndarray:
+    """∫ f_mf cosθ_r dω_r over the facets m: dω_r = 4 cosβ dω_m, dω_m = cos³θ dx dy of the slopes; shape (N,)."""
+    sigma = float(model.values["sigma"])
+    node, weight = np.polynomial.legendre.leggauss(RADII)
+    radius = 0.5 * REACH * (node + 1.0)
+    # the half plane y > 0, counted twice: f00 is even in φ
+    direction = (np.arange(DIRECTIONS) + 0.5) * math.pi / DIRECTIONS
+    slope_x = sigma * radius[:, None] * np.cos(direction)
+    slope_y = sigma * radius[:, None] * np.sin(direction)
+    area = sigma**2 * (0.5 * REACH * weight * radius)[:, None] * (2.0 * math.pi / DIRECTIONS)
+    cos_m = 1.0 / np.sqrt(1.0 + slope_x**2 + slope_y**2)
+    m = np.stack([slope_x * cos_m, slope_y * cos_m, cos_m])
+    incident = np.stack([-np.sin(theta_i), np.zeros_like(theta_i), np.cos(theta_i)], -1)
+    cos_beta = np.einsum("ni,ixy->nxy", incident, m)
+    r = 2.0 * cos_beta[:, None] * m - incident[:, :, None, None]
+    seen = (cos_beta > 0.0) & (r[:, 2] > 0.0)
+    theta_r = np.where(seen, np.arctan2(np.hypot(r[:, 0], r[:, 1]), r[:, 2]), 0.0)
+    phi = np.where(seen, np.arctan2(r[:, 1], r[:, 0]), 0.0)
+    f = model.stokes(theta_i[:, None, None], theta_r, phi, part="specular")[..., 0]
+    return np.where(seen, f * r[:, 2] * 4.0 * cos_beta * cos_m**3 * area, 0.0).sum((1, 2))
+
+
+def _diffuse_reflectance(model: Model, theta_i: np.ndarray) -> np.ndarray:
+    """∫ f_vol cosθ_r dω_r with cosθ_r = s², which tames the singularity of cosθ_r^(k−1); shape (N,)."""
+    node, weight = np.polynomial.legendre.leggauss(ZENITHS)
+    s = 0.5 * (node + 1.0)
+    cos_r = s * s
+    solid_angle = (0.5 * weight * 2.0 * s)[:, None] * (2.0 * math.pi / AZIMUTHS)  # both halves of the azimuth
+    phi = (np.arange(AZIMUTHS) + 0.5) * math.pi / AZIMUTHS
+    f = model.stokes(theta_i[:, None, None], np.arccos(cos_r)[:, None], phi, part="diffuse")[..., 0]
+    return (f * cos_r[:, None] * solid_angle).sum((1, 2))
+
+
+def least_coherency(model: Model) -> tuple[float, tuple[float, float, float]]:
+    """Smallest eigenvalue of Cloude's coherency matrix over a grid of directions.
+
+    Parameters
+    ----------
+    model
+        The model.
+
+    Returns
+    -------
+    tuple
+        The eigenvalue in units of f00 (negative beyond rounding: no passive surface has this Mueller matrix), and
+        (θ_i, θ_r, φ) in radians where it stands. The grid holds zenith angles of 0° to 80° by 10° and 89° and
+        azimuths of 0° to 180° by 15°, mirror and backscatter directions among them.
+    """
+    zenith = np.deg2rad([*range(0, 81, 10), 89])
+    angles = np.meshgrid(zenith, zenith, np.deg2rad(np.arange(0, 181, 15)), indexing="ij")
+    flat = [a.ravel() for a in angles]
+    f = np.asarray(model.mueller(*flat))
+    f00 = f[:, :1, :1]
+    least = coherency_eigenvalues(f / np.where(f00 > 0.0, f00, 1.0))[:, 0]
+    worst = int(np.argmin(least))
+    return float(least[worst]), (float(flat[0][worst]), float(flat[1][worst]), float(flat[2][worst]))
+
+
+def _energy(result: FitResult, attributes: dict[Any, Any]) -> Finding:
+    incidence = np.deg2rad(INCIDENCES)
+    reflectance = directional_hemispherical_reflectance(result.model, incidence)
+    worst = int(np.argmax(reflectance))
+    largest = f"The model reflects at most {reflectance[worst]:.3g} of natural light (at θ_i = {INCIDENCES[worst]}°)"
+    gain = any(term.role == "gain" for term in result.space.terms)
+    unknown = _unknown_scale(attributes)
+    if unknown and not gain:
+        sentence = f"{largest}, which says nothing about energy: {unknown}."
+        return Finding("energy", Severity.NOTE, sentence)
+    above = reflectance > 1.0 + ENERGY_TOLERANCE
+    if gain:
+        # the lobe has no free factor of its own: its height against Fresnel's reflectance is what fixes a gain
+        sentence = f"{largest}; that rests on the fitted gain, which only the height of the lobe determines."
+        return Finding("energy", Severity.WARNING if above.any() else Severity.NOTE, sentence)
+    if not above.any():
+        return Finding("energy", Severity.OK, f"{largest}: no more than it receives.")
+    used = _used(result)
+    measured = result.data.theta_i[used]
+    inside = (incidence >= measured.min() - 1e-9) & (incidence <= measured.max() + 1e-9)
+    if not (above & inside).any():
+        sentence = f"{largest}, more than it receives, though only beyond the measured angles of incidence."
+        return Finding("energy", Severity.WARNING, sentence)
+    sentence = (
+        f"{largest}, more than it receives: the data are not an absolute BRDF (then set their attribute scale to "
+        '"arbitrary"), or the fit is wrong.'
+    )
+    return Finding("energy", Severity.VIOLATION, sentence)
+
+
+def _unknown_scale(attributes: dict[Any, Any]) -> str:
+    """Why the scale of the values is not absolute; empty if nothing says so."""
+    quantity = attributes.get("quantity")
+    if attributes.get("scale") == "arbitrary":
+        return "the data are on an arbitrary scale"
+    if quantity in ("radiance", "dn"):
+        kind = "digital numbers" if quantity == "dn" else "radiances"
+        return f"the data are {kind}, proportional to the BRDF by an unknown factor"
+    return ""
+
+
+def _realisability(model: Model) -> Finding:
+    least, where = least_coherency(model)
+    if least >= -COHERENCY_TOLERANCE:
+        sentence = "Every Mueller matrix on a grid over the hemisphere is that of a passive surface."
+        return Finding("realisability", Severity.OK, sentence)
+    i, r, phi = np.rad2deg(where)
+    sentence = (
+        f"The Mueller matrix at θ_i = {i:.0f}°, θ_r = {r:.0f}°, φ = {phi:.0f}° is that of no passive surface: its "
+        f"coherency matrix has the eigenvalue {least:.2g}·f00."
+    )
+    return Finding("realisability", Severity.VIOLATION, sentence)
+
+
+def _parameters(result: FitResult) -> list[Finding]:
+    findings = []
+    for name, estimate in result.estimates.items():
+        if estimate.verdict.startswith("at "):
+            sentence = (
+                f"{name} = {estimate.value:.4g} stands {estimate.verdict}: the data pull it further, and the other "
+                "parameters make up for that."
+            )
+            findings.append(Finding("parameters", Severity.WARNING, sentence))
+        elif estimate.verdict == "undetermined":
+            sentence = f"{name} = {estimate.value:.4g} is not determined by these data."
+            findings.append(Finding("parameters", Severity.WARNING, sentence))
+    if not findings:
+        sentence = "Every fitted parameter is determined and inside its bounds."
+        findings.append(Finding("parameters", Severity.OK, sentence))
+    return findings
+
+
+def _lobe(result: FitResult) -> Finding:
+    """Whether the specular lobe was measured: its height carries n, its width σ."""
+    sigma = float(result.model.values["sigma"])
+    tilt = _tilt(result)[_used(result)]
+    count = int((np.tan(tilt) <= LOBE_WIDTHS * sigma).sum())
+    width = np.rad2deg(math.atan(LOBE_WIDTHS * sigma))
+    near = f"{LOBE_WIDTHS:g}σ ({width:.2g}° of facet tilt) of the mirror direction"
+    if count == 0:
+        sentence = (
+            f"No fitted point lies within {near}: σ and n rest on the tail of the lobe or on the diffuse part, and "
+            "the predicted peak is extrapolation."
+        )
+        return Finding("lobe", Severity.WARNING, sentence)
+    if count < LOBE_POINTS:
+        noun, verb = ("point", "lies") if count == 1 else ("points", "lie")
+        sentence = f"Only {count} fitted {noun} {verb} within {near}: σ and n rest on them."
+        return Finding("lobe", Severity.WARNING, sentence)
+    return Finding("lobe", Severity.OK, f"The lobe was measured: {count} fitted points lie within {near}.")
+
+
+def _range(result: FitResult) -> list[Finding]:
+    data, used = result.data, _used(result)
+    ranges = {
+        "θ_i": np.rad2deg(data.theta_i[used]),
+        "θ_r": np.rad2deg(data.theta_r[used]),
+        "facet tilt": np.rad2deg(_tilt(result)[used]),
+    }
+    off_plane = np.rad2deg(_off_plane(data.phi[used]))
+    azimuth = np.rad2deg(np.abs(np.arctan2(np.sin(data.phi[used]), np.cos(data.phi[used]))))
+    shown = [f"{name} {values.min():.3g}–{values.max():.3g}°" for name, values in ranges.items()]
+    if off_plane.max() < 1.0:
+        shown.append("azimuth in the plane of incidence only")
+        beyond = "Beyond that, and everywhere out of the plane of incidence, predictions are extrapolation."
+    else:
+        shown.append(f"|φ| {azimuth.min():.3g}–{azimuth.max():.3g}°")
+        beyond = "Beyond that predictions are extrapolation."
+    sentence = f"The fit rests on {int(used.sum())} geometries: {', '.join(shown)}. {beyond}"
+    findings = [Finding("range", Severity.NOTE, sentence)]
+    held = result.comparison["held_out"].values
+    if held.any():
+        columns = {
+            "θ_i": np.rad2deg(result.comparison["theta_i"].values[held]),
+            "θ_r": np.rad2deg(result.comparison["theta_r"].values[held]),
+            "facet tilt": np.rad2deg(result.comparison["facet_tilt"].values[held]),
+        }
+        outside = {
+            name: int(((v < ranges[name].min() - 0.05) | (v > ranges[name].max() + 0.05)).sum())
+            for name, v in columns.items()
+        }
+        listed = [f"{count} in {name}" for name, count in outside.items() if count]
+        total = int(held.sum())
+        sentence = (
+            f"Of the {total} held-out geometries some lie outside the fitted range: {', '.join(listed)}."
+            if listed
+            else f"The {total} held-out geometries lie inside the fitted ranges of θ_i, θ_r and facet tilt: "
+            "they test interpolation."
+        )
+        findings.append(Finding("range", Severity.NOTE, sentence))
+    return findings
+
+
+def _used(result: FitResult) -> np.ndarray:
+    """Geometries of the fitted data with at least one measured value, shape (G,)."""
+    return np.isfinite(result.data.std).any(axis=0)
+
+
+def _tilt(result: FitResult) -> np.ndarray:
+    """Tilt of the mirror facet at the fitted geometries in radians, shape (G,)."""
+    return result.comparison["facet_tilt"].values[~result.comparison["held_out"].values]
+
+
+def _off_plane(phi: np.ndarray) -> np.ndarray:
+    """Angle in radians between the plane of view and the plane of incidence, 0 … π/2."""
+    return np.arcsin(np.minimum(np.abs(np.sin(phi)), 1.0))

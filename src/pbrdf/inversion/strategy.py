@@ -1,0 +1,275 @@
+"""How the search runs: all parameters together, or step by step as the paper does.
+
+Stepwise (paper, section 2.2): the diffuse parameters a, k, b, t from the geometries where the specular lobe is
+negligible, with σ and n held; then σ and n from all geometries, with the diffuse parameters held. The
+paper does not say where it holds σ and n in the first step: here σ comes from a wide first guess that is
+replaced by the fitted one until the choice of geometries no longer changes, and n from the parameter's
+default, then from the second step. Beyond the paper, an optional last step polishes all parameters together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+from pbrdf.errors import FitError
+from pbrdf.inversion.clusters import cluster
+from pbrdf.inversion.observations import Observations
+from pbrdf.inversion.problem import Space, residuals
+from pbrdf.inversion.solver import Solution, solve
+
+__all__ = ["STRATEGIES", "Stage", "facet_tilt", "joint", "stepwise"]
+
+STRATEGIES = ("joint", "stepwise")
+#: Parameters of the diffuse and of the specular step.
+DIFFUSE, SPECULAR = ("a", "k", "b", "t"), ("sigma", "n", "kappa")
+#: The lobe counts as negligible where the mirror facet is tilted by more than this many σ.
+LOBE_WIDTH = 4.5
+#: First guess of σ for choosing geometries, and how often the choice is revised.
+WIDE_SIGMA, REVISIONS = 0.1, 4
+
+Progress = Callable[[int, int], None] | None
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One step of a fit.
+
+    Attributes
+    ----------
+    name
+        ``"diffuse"``, ``"specular"`` or ``"joint"``.
+    free, held
+        Names of the parameters that were free, and values of those held, at the best start.
+    values
+        All parameters after the step, at the best start.
+    points
+        Number of geometries used.
+    chi2
+        Σ (residual/std)² over these geometries at the best start.
+    """
+
+    name: str
+    free: tuple[str, ...]
+    held: dict[str, float]
+    values: dict[str, float]
+    points: int
+    chi2: float
+
+
+def facet_tilt(theta_i: np.ndarray, theta_r: np.ndarray, phi: np.ndarray) -> np.ndarray:
+    """Tilt of the facet that mirrors source into viewer, radians; angles in radians, same shape."""
+    sin_i, sin_r = np.sin(theta_i), np.sin(theta_r)
+    across = np.hypot(sin_r * np.cos(phi) - sin_i, sin_r * np.sin(phi))
+    return np.arctan2(across, np.cos(theta_i) + np.cos(theta_r))
+
+
+def joint(
+    space: Space, data: Observations, first: np.ndarray, max_iterations: int, progress: Progress
+) -> tuple[Solution, list[Stage]]:
+    """Search from all starts with the draft accuracy, then refine each distinct end with the model's own.
+
+    Every start gets the refined end of its cluster.
+
+    Parameters
+    ----------
+    space, data
+        The problem.
+    first
+        Starting unknowns, shape (S, P).
+    max_iterations, progress
+        As for :func:`pbrdf.inversion.solver.solve`.
+
+    Returns
+    -------
+    solution, stages
+        S lanes; and the one stage.
+    """
+    low, high = space.to_unknowns(space.lower), space.to_unknowns(space.upper)
+    search = solve(
+        residuals(space, [data], len(first), accuracy="draft"),
+        first,
+        low,
+        high,
+        max_iterations=max_iterations,
+        tolerance=1e-6,
+        progress=progress,
+    )
+    solution = _refine(space, data, search, low, high, max_iterations)
+    return solution, [_stage("joint", space, solution, space.names, data)]
+
+
+def stepwise(
+    space: Space,
+    data: Observations,
+    first: np.ndarray,
+    max_iterations: int,
+    progress: Progress,
+    *,
+    polish: bool = True,
+    diffuse_tilt: float | None = None,
+) -> tuple[Solution, list[Stage], np.ndarray]:
+    """The paper's strategy.
+
+    Parameters
+    ----------
+    space, data, first, max_iterations, progress
+        As for :func:`joint`.
+    polish
+        Whether all parameters are fitted together in the end.
+    diffuse_tilt
+        Facet tilt in radians beyond which a geometry counts as diffuse; None chooses it from the running σ.
+
+    Returns
+    -------
+    solution, stages, diffuse
+        S lanes, whose information matrix is that of all parameters together; the stages; and the mask of the
+        geometries used for the diffuse step, shape (G,).
+
+    Raises
+    ------
+    FitError
+        If a parameter is free for each group or wavelength, no diffuse or specular parameter is free, or too
+        few geometries lie outside the lobe.
+    """
+    names = space.names
+    diffuse_free = [n for n in names if n in DIFFUSE]
+    specular_free = [n for n in names if n not in DIFFUSE]
+    if any(
+        term.split == "wavelength" or (term.split and term.role in DIFFUSE + SPECULAR) for term in space.terms
+    ):
+        raise FitError(
+            "stepwise: parameters of the model that are free for each group or wavelength need joint"
+        )
+    if not diffuse_free or not any(n in SPECULAR for n in names):
+        raise FitError("stepwise: at least one of a, k, b, t and one of sigma, n, kappa must be free")
+    low, high = space.to_unknowns(space.lower), space.to_unknowns(space.upper)
+    is_diffuse = np.array([n in DIFFUSE for n in names])
+    tilt = facet_tilt(data.theta_i, data.theta_r, data.phi)
+
+    # nuisance terms and n start the first step at their defaults, the diffuse parameters all over the bounds
+    u = first.copy()
+    held = _held_values(space, first)
+    u[:, ~is_diffuse] = held[~is_diffuse]
+    stages: list[Stage] = []
+    diffuse = _choose(tilt, data, diffuse_tilt, WIDE_SIGMA, len(diffuse_free), shrink=True)
+    for _ in range(REVISIONS):
+        part = _only(data, diffuse)
+        one = _step(space, part, u, is_diffuse, low, high, max_iterations, progress)
+        stages.append(_stage("diffuse", space, one, diffuse_free, part))
+        u = one.u.copy()
+        u[:, ~is_diffuse] = first[:, ~is_diffuse]
+        two = _step(space, data, u, ~is_diffuse, low, high, max_iterations, progress)
+        stages.append(_stage("specular", space, two, specular_free, data))
+        best = space.to_parameters(two.u[int(np.nanargmin(two.cost))])
+        sigma = float(best[names.index("sigma")]) if "sigma" in names else space.fixed["sigma"]
+        revised = _choose(tilt, data, diffuse_tilt, sigma, len(diffuse_free), shrink=False)
+        u = two.u.copy()
+        u[:, ~is_diffuse] = two.u[int(np.nanargmin(two.cost)), ~is_diffuse]
+        if (revised == diffuse).all():
+            break
+        diffuse = revised
+    if polish:
+        solution = _refine(space, data, two, low, high, max_iterations)
+        stages.append(_stage("joint", space, solution, names, data))
+    else:
+        # standard errors from all parameters together: those of one step alone would be too small
+        final = solve(residuals(space, [data], len(two.u)), two.u, two.u, two.u, max_iterations=1)
+        solution = replace(final, status=two.status)
+    return solution, stages, diffuse
+
+
+def _held_values(space: Space, first: np.ndarray) -> np.ndarray:
+    values = np.array(
+        [np.clip(p.default, lo, hi) for p, lo, hi in zip(space.free, space.lower, space.upper, strict=True)]
+    )
+    result = space.to_unknowns(values)
+    for i in range(first.shape[1]):
+        if np.ptp(first[:, i]) == 0.0:  # the user said where to start
+            result[i] = first[0, i]
+    return result
+
+
+def _choose(
+    tilt: np.ndarray, data: Observations, override: float | None, sigma: float, free: int, shrink: bool
+) -> np.ndarray:
+    """Geometries outside the lobe; with ``shrink`` the guess of σ is halved until enough are left."""
+    if override is not None:
+        chosen = tilt > override
+    else:
+        chosen = tilt > np.arctan(LOBE_WIDTH * sigma)
+        while shrink and _count(data, chosen) < 3 * free and sigma > 0.005:
+            sigma *= 0.5
+            chosen = tilt > np.arctan(LOBE_WIDTH * sigma)
+    if _count(data, chosen) <= free:
+        raise FitError(
+            f"stepwise: {_count(data, chosen)} values outside the specular lobe cannot determine {free} diffuse "
+            "parameters; measure more there, state another tilt, or use the joint strategy"
+        )
+    return chosen
+
+
+def _count(data: Observations, chosen: np.ndarray) -> int:
+    return int(np.isfinite(data.std[:, chosen]).sum())
+
+
+def _only(data: Observations, chosen: np.ndarray) -> Observations:
+    """The same geometries, weight 0 for those not chosen: the form, and so the kernel, stays the same."""
+    return replace(data, std=np.where(chosen, data.std, np.inf))
+
+
+def _step(
+    space: Space,
+    data: Observations,
+    u: np.ndarray,
+    free: np.ndarray,
+    low: np.ndarray,
+    high: np.ndarray,
+    max_iterations: int,
+    progress: Progress,
+) -> Solution:
+    """One step from all starts; the unknowns that are not free stay where they are."""
+    return solve(
+        residuals(space, [data], len(u), accuracy="draft"),
+        u,
+        np.where(free, low, u),
+        np.where(free, high, u),
+        max_iterations=max_iterations,
+        tolerance=1e-6,
+        progress=progress,
+    )
+
+
+def _refine(
+    space: Space, data: Observations, search: Solution, low: np.ndarray, high: np.ndarray, max_iterations: int
+) -> Solution:
+    clusters = cluster(search.u, search.cost, high - low, 1e-3, 1e-3)
+    if not clusters:
+        return search
+    leaders = np.array([members[0] for members in clusters])
+    refined = solve(
+        residuals(space, [data], len(leaders)), search.u[leaders], low, high, max_iterations=max_iterations
+    )
+    cluster_of = np.zeros(len(search.u), dtype=int)
+    for number, members in enumerate(clusters):
+        cluster_of[members] = number
+    columns = {f.name: getattr(refined, f.name)[cluster_of] for f in fields(Solution)}
+    lost = ~np.isfinite(search.cost)
+    columns["cost"] = np.where(lost, np.inf, columns["cost"])
+    columns["status"] = np.where(lost, search.status, columns["status"])
+    return Solution(**columns)
+
+
+def _stage(name: str, space: Space, solution: Solution, free: list[str], data: Observations) -> Stage:
+    best = int(np.nanargmin(solution.cost))
+    values = dict(zip(space.names, map(float, space.to_parameters(solution.u[best])), strict=True))
+    return Stage(
+        name=name,
+        free=tuple(free),
+        held={n: v for n, v in values.items() if n not in free},
+        values=values,
+        points=int(np.isfinite(data.std).any(axis=0).sum()),
+        chi2=2.0 * float(solution.cost[best]),
+    )
