@@ -1,0 +1,294 @@
+"""Profile likelihood against closed forms of linear problems and against SciPy on the model."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import SimpleNamespace
+
+import drjit as dr
+import numpy as np
+import pytest
+from scipy import stats
+from scipy.optimize import brentq, least_squares, lsq_linear
+
+import pbrdf
+from pbrdf.backend import get_backend
+from pbrdf.errors import FitError
+from pbrdf.inversion import profile as module
+from pbrdf.inversion.profile import Optima, contour, interval_ends, profile
+from pbrdf.inversion.solver import Residuals
+
+NAMES = ("x", "y", "z")
+
+
+@dataclass(frozen=True)
+class PlainSpace:
+    """Unknowns that are their own parameters."""
+
+    names: list[str]
+    lower: np.ndarray
+    upper: np.ndarray
+
+    def to_unknowns(self, values):
+        return np.array(values, dtype=float)
+
+    to_parameters = to_unknowns
+
+
+def design() -> np.ndarray:
+    """30 measurements of three correlated unknowns, shape (30, 3)."""
+    s = np.linspace(0.0, 1.0, 30)
+    return np.column_stack([np.ones_like(s), s, s**2]) * 3.0
+
+
+def linear_fit(monkeypatch, matrix, measured, lower=-50.0, upper=50.0, std_known=True):
+    """A fit of measured = matrix · u with unit standard uncertainties, its optimum by SciPy."""
+    count, size = matrix.shape
+    space = PlainSpace(
+        list(NAMES[:size]), np.broadcast_to(lower, size) * 1.0, np.broadcast_to(upper, size) * 1.0
+    )
+
+    def residuals(space, data, starts=1):
+        backend = get_backend()
+        columns = [backend.upload(backend.Float, column) for column in matrix.T]
+        y = backend.upload(backend.Float, np.concatenate(data))
+
+        def function(u, lane, point):
+            total = sum(dr.gather(backend.Float, c, point) * v for c, v in zip(columns, u, strict=True))
+            return [total - dr.gather(backend.Float, y, (lane // starts) * count + point)], None
+
+        return Residuals(function, count)
+
+    monkeypatch.setattr(module, "residuals", residuals)
+    best = lsq_linear(matrix, measured, (space.lower, space.upper), method="bvls", tol=1e-15)
+    chi2 = 2.0 * best.cost
+    return SimpleNamespace(
+        space=space,
+        data=measured,
+        unknowns=best.x,
+        information=matrix.T @ matrix,
+        std_known=std_known,
+        goodness=SimpleNamespace(data=count, free=size, chi2=chi2, reduced_chi2=chi2 / (count - size)),
+    )
+
+
+@pytest.fixture
+def measured():
+    rng = np.random.default_rng(5)
+    return design() @ [1.0, -2.0, 0.5] + rng.standard_normal(30)
+
+
+@pytest.mark.parametrize("level", [0.68, 0.95, 0.999])
+def test_a_linear_problem_gives_the_normal_interval(monkeypatch, measured, level):
+    result = linear_fit(monkeypatch, design(), measured)
+    found = profile(result, level=level)
+    error = np.sqrt(np.diag(np.linalg.inv(result.information)))
+    z = stats.norm.ppf(0.5 + 0.5 * level)
+    for i, name in enumerate(NAMES):
+        interval = found.intervals[name]
+        # to 1e-3 of a standard error, as promised
+        assert abs(interval.lower - (result.unknowns[i] - z * error[i])) < 1e-3 * error[i]
+        assert abs(interval.upper - (result.unknowns[i] + z * error[i])) < 1e-3 * error[i]
+        assert not interval.lower_at_bound and not interval.upper_at_bound
+    assert found.notes == []
+    assert found.better is None
+
+
+def test_an_estimated_scale_gives_students_interval(monkeypatch, measured):
+    """With ν degrees of freedom the exact interval of a linear model is value ± t(ν) s √C."""
+    result = linear_fit(monkeypatch, design(), 7.0 * measured, std_known=False)
+    found = profile(result)
+    error = np.sqrt(np.diag(np.linalg.inv(result.information)) * result.goodness.reduced_chi2)
+    t = stats.t.ppf(0.975, 27)
+    ends = np.array([[found.intervals[n].lower, found.intervals[n].upper] for n in NAMES])
+    np.testing.assert_allclose(ends[:, 0], result.unknowns - t * error, atol=1e-3 * error.min())
+    np.testing.assert_allclose(ends[:, 1], result.unknowns + t * error, atol=1e-3 * error.min())
+
+
+def test_curves_are_parabolas_with_the_others_refitted(monkeypatch, measured):
+    result = linear_fit(monkeypatch, design(), measured)
+    curves = profile(result, ["y"], points=11).curves
+    value = curves["value"].sel(parameter="y").values
+    variance = np.linalg.inv(result.information)[1, 1]
+    np.testing.assert_allclose(
+        curves["chi2_rise"].sel(parameter="y"), (value - result.unknowns[1]) ** 2 / variance, atol=1e-9
+    )
+    for held, refitted in zip(value, curves["refitted"].sel(parameter="y").values, strict=True):
+        rest = np.linalg.lstsq(design()[:, [0, 2]], measured - design()[:, 1] * held, rcond=None)[0]
+        np.testing.assert_allclose(refitted, [rest[0], held, rest[1]], atol=1e-8)
+    assert curves.sizes == {"parameter": 1, "point": 11, "other": 3}
+
+
+def test_an_interval_that_reaches_a_bound_says_so(monkeypatch, measured):
+    free = linear_fit(monkeypatch, design(), measured)
+    error = np.sqrt(np.diag(np.linalg.inv(free.information)))
+    upper = np.array([50.0, free.unknowns[1] + 0.5 * error[1], 50.0])
+    result = linear_fit(monkeypatch, design(), measured, upper=upper)
+    found = profile(result)
+    assert found.intervals["y"].upper == upper[1]
+    assert found.intervals["y"].upper_at_bound and not found.intervals["y"].lower_at_bound
+    expected = free.unknowns[1] - stats.norm.ppf(0.975) * error[1]
+    assert abs(found.intervals["y"].lower - expected) < 1e-3 * error[1]
+    assert any("y: the interval reaches the upper bound" in note for note in found.notes)
+    # y rises as x falls and meets its bound: the profile of x is then steeper than the Jacobian says
+    assert any(note.startswith("x: at the lower end") and "y lies on a bound" in note for note in found.notes)
+
+
+def test_an_optimum_on_a_bound_gives_one_sided_intervals(monkeypatch, measured):
+    """Against a brute-force profile of the constrained problem with SciPy."""
+    free = linear_fit(monkeypatch, design(), measured)
+    error = np.sqrt(np.diag(np.linalg.inv(free.information)))
+    lower = np.array([-50.0, free.unknowns[1] + 0.7 * error[1], -50.0])
+    result = linear_fit(monkeypatch, design(), measured, lower=lower)
+    assert result.unknowns[1] == lower[1]
+    found = profile(result)
+
+    def rise(i, held):
+        others = [j for j in range(3) if j != i]
+        best = lsq_linear(
+            design()[:, others],
+            measured - design()[:, i] * held,
+            (lower[others], np.full(2, 50.0)),
+            method="bvls",
+            tol=1e-15,
+        )
+        return 2.0 * best.cost - result.goodness.chi2 - stats.chi2.ppf(0.95, 1)
+
+    for i, name in enumerate(NAMES):
+        best, interval = result.unknowns[i], found.intervals[name]
+        upper_end = brentq(lambda v, i=i: rise(i, v), best, best + 5.0 * error[i])
+        assert abs(interval.upper - upper_end) < 2e-3 * error[i]
+        if i != 1:
+            lower_end = brentq(lambda v, i=i: rise(i, v), best - 5.0 * error[i], best)
+            assert abs(interval.lower - lower_end) < 2e-3 * error[i]
+    assert found.intervals["y"].lower == lower[1] and found.intervals["y"].lower_at_bound
+
+
+def test_many_data_sets_at_once_give_what_each_gives_alone(monkeypatch):
+    rng = np.random.default_rng(8)
+    sets = [design() @ [1.0, -2.0, 0.5] + rng.standard_normal(30) for _ in range(7)]
+    fits = [linear_fit(monkeypatch, design(), y) for y in sets]
+    together = Optima.at(
+        fits[0].space, sets, np.stack([f.unknowns for f in fits]), np.stack([f.information for f in fits])
+    )
+    ends = interval_ends(together, np.full(7, stats.chi2.ppf(0.95, 1)), [0, 2])
+    error = np.sqrt(np.diag(np.linalg.inv(fits[0].information)))
+    assert ends.found.all()
+    for result, found in zip(fits, ends.value, strict=True):
+        expected = [result.unknowns[i] + s * 1.95996 * error[i] for i in (0, 2) for s in (-1, 1)]
+        np.testing.assert_allclose(found, expected, atol=1e-3 * error.min())
+
+
+def test_contours_are_the_joint_ellipses_of_two_parameters(monkeypatch, measured):
+    result = linear_fit(monkeypatch, design(), measured)
+    found = contour(result, "x", "z", levels=(0.68, 0.95), points=21)
+    np.testing.assert_allclose(list(found.rises.values()), [2.2789, 5.9915], atol=1e-4)
+    cov = np.linalg.inv(result.information)[np.ix_([0, 2], [0, 2])]
+    grid = np.stack(np.meshgrid(found.grid["x"], found.grid["z"], indexing="ij"), axis=-1)
+    away = grid - result.unknowns[[0, 2]]
+    expected = np.einsum("abi,ij,abj->ab", away, np.linalg.inv(cov), away)
+    np.testing.assert_allclose(found.grid["chi2_rise"], expected, rtol=1e-6, atol=1e-8)
+    # the grid holds the whole 95 % region, which on each axis is √(5.99/3.84) as wide as a single interval
+    for name, variance in zip(("x", "z"), np.diag(cov), strict=True):
+        span = np.ptp(found.grid[name].values)
+        np.testing.assert_allclose(span, 2.0 * np.sqrt(5.9915 * variance) * 1.25, rtol=1e-3)
+
+
+def test_contour_thresholds_follow_f_where_the_scale_is_estimated(monkeypatch, measured):
+    result = linear_fit(monkeypatch, design(), measured, std_known=False)
+    found = contour(result, "x", "y", levels=(0.9,), points=3)
+    expected = 2.0 * stats.f.ppf(0.9, 2, 27) * result.goodness.reduced_chi2
+    np.testing.assert_allclose(found.rises[0.9], expected)
+
+
+def test_a_curved_problem_gives_an_asymmetric_interval(monkeypatch, measured):
+    """r = eᵘ − 3: the ends are ln(3 ± 1.96) in closed form, the lower one four times as far away."""
+    result = linear_fit(monkeypatch, design()[:, :1], measured)
+    monkeypatch.setattr(
+        module,
+        "residuals",
+        lambda space, data, starts=1: Residuals(lambda u, lane, point: ([dr.exp(u[0]) - 3.0], None), 1),
+    )
+    result.unknowns, result.information = np.log([3.0]), np.array([[9.0]])
+    interval = profile(result).intervals["x"]
+    np.testing.assert_allclose(
+        [interval.lower, interval.upper], np.log([3 - 1.95996, 3 + 1.95996]), atol=3e-4
+    )
+
+
+def test_a_better_optimum_on_the_way_is_reported(monkeypatch, measured):
+    """Two wells, at u = ±1, with a barrier below the threshold; the fit ended in the worse one."""
+    result = linear_fit(monkeypatch, design()[:, :1], measured)
+
+    def residuals(space, data, starts=1):
+        return Residuals(lambda u, lane, point: ([1.5 * (u[0] * u[0] - 1.0), 0.3 * (u[0] - 1.0)], None), 1)
+
+    monkeypatch.setattr(module, "residuals", residuals)
+    worse = least_squares(lambda u: [1.5 * (u[0] ** 2 - 1.0), 0.3 * (u[0] - 1.0)], [-1.0], xtol=1e-15)
+    result.unknowns, result.information = worse.x, worse.jac.T @ worse.jac
+    found = profile(result)
+    np.testing.assert_allclose(found.better["x"], 1.0, atol=1e-6)
+    assert abs(found.better_chi2) < 1e-10
+    assert "better optimum" in found.notes[0]
+
+
+@pytest.fixture(scope="module")
+def small_fit():
+    """Three free parameters, 21 geometries: weak enough to be asymmetric, small enough for SciPy."""
+    dataset = pbrdf.open_experiment("pearl-white")
+    tilted = np.flatnonzero((dataset["group"].values == 1) & (np.arange(63) % 2 == 0))
+    fix = {"sigma": 0.038, "k": 2.6395, "b": 2.4167}
+    return pbrdf.fit(dataset.isel(geometry=tilted), fix=fix, starts=16)
+
+
+def test_ends_on_the_model_are_where_scipys_profile_crosses_the_threshold(small_fit):
+    data, names = small_fit.data, small_fit.space.names
+    rows = ["IQUV".index(c) for c in data.channels]
+    best = small_fit.space.to_parameters(small_fit.unknowns)
+    found = profile(small_fit)
+
+    def chi2(values):
+        model = small_fit.model.replace(**dict(zip(names, values, strict=True)))
+        S = model.stokes(data.theta_i, data.theta_r, data.phi)
+        return ((S.T[rows] - data.values) * data.weights).ravel()
+
+    lowest = (chi2(best) ** 2).sum()
+    for i, name in enumerate(names):
+        for end in (found.intervals[name].lower, found.intervals[name].upper):
+
+            def residual(free, i=i, end=end):
+                return chi2(np.insert(free, i, end))
+
+            peer = least_squares(
+                residual, np.delete(best, i), x_scale=np.delete(best, i), xtol=1e-14, ftol=1e-14
+            )
+            # 1e-3 of a standard error in the end is 4e-3 in χ² there
+            np.testing.assert_allclose(2.0 * peer.cost - lowest, 3.8415, atol=4e-3)
+
+
+def test_contour_on_the_model_touches_its_profile_intervals(small_fit):
+    """The lowest χ² along one parameter of the grid is that parameter's profile."""
+    found = contour(small_fit, "t", "n", points=41)
+    curve = profile(small_fit, ["t"], level=0.99).curves.sel(parameter="t")
+    shadow = np.interp(curve["value"], found.grid["t"], found.grid["chi2_rise"].min("n"))
+    near = curve["chi2_rise"].values < 4.0
+    np.testing.assert_allclose(shadow[near], curve["chi2_rise"].values[near], atol=0.15)
+    assert found.notes == []
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda r: profile(r, ["m"]), "not a free parameter of this fit: free are n, a, t"),
+        (lambda r: profile(r, ["sigma"]), "'sigma' is not a free parameter"),
+        (lambda r: profile(r, []), "no parameter was named"),
+        (lambda r: profile(r, level=1.0), "level=1"),
+        (lambda r: profile(r, points=2), "points=2"),
+        (lambda r: contour(r, "n", "n"), "two different parameters"),
+        (lambda r: contour(r, "n", "q"), "'q' is not a free parameter"),
+        (lambda r: contour(r, "n", "t", levels=()), "at least one level"),
+    ],
+)
+def test_errors_say_what_to_do(small_fit, call, message):
+    with pytest.raises(FitError, match=message):
+        call(small_fit)
