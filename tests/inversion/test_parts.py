@@ -13,7 +13,8 @@ import pbrdf
 from pbrdf.errors import FitError
 from pbrdf.inversion.clusters import cluster
 from pbrdf.inversion.holdout import HoldOut, prediction_errors
-from pbrdf.inversion.noise import NoiseModel
+from pbrdf.inversion.noise import EqualNoise, InstrumentNoise, NoiseModel, parse_noise
+from pbrdf.inversion.observations import Observations
 from pbrdf.inversion.starts import sobol_starts
 from pbrdf.inversion.statistics import covariance, goodness, prior_spread
 
@@ -21,10 +22,10 @@ from pbrdf.inversion.statistics import covariance, goodness, prior_spread
 def test_noise_is_relative_in_the_bright_and_absolute_in_the_dark():
     noise = NoiseModel(relative=0.02, absolute=0.001)
     intensity = np.array([1e-6, 0.5, 0.5, 0.5, 1000.0])
-    std = noise.standard_uncertainty("Q", intensity)
+    std = noise.standard_uncertainty("Q", intensity, np.ones(5))
     assert std[0] == pytest.approx(0.001 * 0.5, rel=1e-3)
     assert std[-1] == pytest.approx(20.0, rel=1e-6)
-    dolp = noise.standard_uncertainty("dolp", intensity)
+    dolp = noise.standard_uncertainty("dolp", intensity, np.ones(5))
     assert dolp[-1] == pytest.approx(0.02, rel=1e-6) and dolp[0] > 100.0
 
 
@@ -113,3 +114,40 @@ def test_prediction_errors_by_hand():
     assert errors.count == 4
     assert errors.intensity_rms == pytest.approx(0.1) and errors.intensity_max == pytest.approx(0.1)
     assert errors.dolp_max == pytest.approx(0.1) and errors.dolp_rms == pytest.approx(0.1 / math.sqrt(3.0))
+
+
+def test_instrument_noise_adds_read_noise_and_quantisation_on_the_datas_scale():
+    """8-bit digital numbers: quantisation alone gives 0.289 DN; radiance DN = f cosθ_i here."""
+    noise = parse_noise("instrument:linear=1%,circular=5%,read=0.5,quantum=1")
+    assert noise == InstrumentNoise(0.01, 0.05, 0.5, 1.0)
+    cosine = np.array([1.0, 0.5])
+    std = noise.standard_uncertainty("Q", np.array([0.0, 100.0]) / cosine, 1.0 / cosine)
+    floor = math.hypot(0.5, 0.2887)
+    np.testing.assert_allclose(std * cosine, [floor, math.hypot(1.0, floor)], rtol=1e-3)
+    assert noise.standard_uncertainty("V", np.array([100.0]), np.ones(1))[0] == pytest.approx(5.03, rel=1e-2)
+    with pytest.raises(FitError, match="give instrument:linear"):
+        parse_noise("instrument:gain=3")
+
+
+def test_equal_weights_are_equal_and_their_scale_unknown():
+    dataset = pbrdf.open_experiment("cd-back")
+    data = Observations.from_dataset(dataset, EqualNoise())
+    assert np.ptp(data.std) == 0.0 and not data.std_known
+    stated = Observations.from_dataset(dataset, InstrumentNoise())
+    assert stated.std_known
+    np.testing.assert_allclose(stated.std[0], 0.01 * np.abs(dataset["I"]))
+
+
+def test_the_papers_objective_compares_intensity_and_dolp():
+    dataset = pbrdf.open_experiment("matte-white-thick")
+    data = Observations.from_dataset(dataset, objective="paper")
+    assert data.channels == ("I", "dolp") and not data.std_known
+    for row, std in zip(data.values, data.std, strict=True):
+        np.testing.assert_allclose(std, np.sqrt((row**2).mean()))
+    result = pbrdf.fit(dataset, objective="paper", starts=16)
+    signed = pbrdf.fit(dataset, starts=16)
+    truth = pbrdf.PAINTS["matte-white-thick"][5]
+    for fitted in (result, signed):
+        assert abs(fitted.estimates["t"].value - truth) < 4.0 * fitted.estimates["t"].std
+    # equal weights let the bright lobe count more than the weak diffuse polarisation that t rests on
+    assert result.estimates["t"].std > signed.estimates["t"].std

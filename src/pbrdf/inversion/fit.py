@@ -14,7 +14,7 @@ from pbrdf.data.validate import validate
 from pbrdf.errors import FitError
 from pbrdf.inversion.clusters import cluster
 from pbrdf.inversion.holdout import HoldOut, Prediction, prediction_errors
-from pbrdf.inversion.noise import NoiseModel
+from pbrdf.inversion.noise import Noise, NoiseModel, parse_noise
 from pbrdf.inversion.nuisance import KINDS, Nuisance, check_prior
 from pbrdf.inversion.observations import Observations
 from pbrdf.inversion.problem import Space, Term, predict
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Estimate", "FitResult", "Optimum", "fit"]
 
+OBJECTIVES = ("stokes", "paper")
 #: A facet tilted by less than this many σ from the mirror direction counts as near-specular.
 NEAR_SPECULAR = 4.0
 
@@ -168,7 +169,8 @@ def fit(
     diffuse_tilt: float | None = None,
     loss: str = "linear",
     starts: int = 64,
-    noise: NoiseModel | str | None = None,
+    noise: Noise | str | None = None,
+    objective: str = "stokes",
     hold_out: HoldOut | str | None = None,
     seed: int = 0,
     max_iterations: int = 100,
@@ -214,8 +216,12 @@ def fit(
     starts
         Number of starts, spread over the bounds by a Sobol sequence.
     noise
-        Stated noise, a :class:`NoiseModel` or text like ``"0.02,0.01"``; None takes the uncertainties of the
-        data set and, where it has none, the default of :class:`NoiseModel`.
+        Stated noise, an object of :mod:`pbrdf.inversion.noise` or its text like ``"0.02,0.01"``, ``"equal"`` or
+        ``"instrument:linear=1%,quantum=1"``; None takes the uncertainties of the data set and, where it has
+        none, the default of :class:`NoiseModel`.
+    objective
+        ``"stokes"``: signed Stokes components (or whatever was measured); ``"paper"``: intensity and DoLP with
+        equal weights, as the paper does.
     hold_out
         Data left out and then predicted, for example ``"group=3"``; see :class:`HoldOut`.
     seed
@@ -236,7 +242,7 @@ def fit(
     """
     validate(dataset)
     if isinstance(noise, str):
-        noise = NoiseModel.parse(noise)
+        noise = parse_noise(noise)
     if isinstance(hold_out, str):
         hold_out = HoldOut.parse(hold_out)
     if starts < 1:
@@ -245,7 +251,9 @@ def fit(
         raise FitError(f"strategy={strategy!r}: choose one of {', '.join(STRATEGIES)}")
     if loss not in LOSSES:
         raise FitError(f"loss={loss!r}: choose one of {', '.join(LOSSES)}")
-    observations = Observations.from_dataset(dataset, noise)
+    if objective not in OBJECTIVES:
+        raise FitError(f"objective={objective!r}: choose one of {', '.join(OBJECTIVES)}")
+    observations = Observations.from_dataset(dataset, noise, objective)
     held = hold_out.mask(dataset, seed) if hold_out else np.zeros(observations.values.shape[1], dtype=bool)
     fitted_data = observations.subset(~held)
     space, begin = _space(model, options or {}, fix or {}, free, bounds or {}, start or {}, fitted_data)
@@ -464,7 +472,7 @@ def _summarise(
     first: np.ndarray,
     low: np.ndarray,
     high: np.ndarray,
-    noise: NoiseModel | None,
+    noise: Noise | None,
     hold_out: HoldOut | None,
     seconds: float,
 ) -> FitResult:
@@ -671,7 +679,7 @@ def _distinct_optima(space: Space, solution: Solution, low: np.ndarray, high: np
     ]
 
 
-def _noise_in_words(noise: NoiseModel | None, data: Observations) -> str:
+def _noise_in_words(noise: Noise | None, data: Observations) -> str:
     if noise is not None:
         return f"stated: {noise}"
     if data.std_known:

@@ -4,12 +4,38 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import ClassVar, Protocol
 
 import numpy as np
 
 from pbrdf.errors import FitError
 
-__all__ = ["NoiseModel"]
+__all__ = ["EqualNoise", "InstrumentNoise", "Noise", "NoiseModel", "parse_noise"]
+
+
+class Noise(Protocol):
+    """Where standard uncertainties come from when the data set does not bring them."""
+
+    #: Whether the numbers are standard uncertainties, or only their ratios are meant.
+    absolute_scale: ClassVar[bool]
+
+    def standard_uncertainty(self, channel: str, intensity: np.ndarray, scale: np.ndarray) -> np.ndarray:
+        """Standard uncertainty of a channel.
+
+        Parameters
+        ----------
+        channel
+            ``I``, ``Q``, ``U``, ``V``, ``dolp`` or ``m00`` … ``m33``.
+        intensity
+            Intensity at the same geometries on the scale of a BRDF, shape (G,).
+        scale
+            Factor that brought the data to that scale, shape (G,).
+
+        Returns
+        -------
+        ndarray
+            On the scale of a BRDF, shape (G,).
+        """
 
 
 @dataclass(frozen=True)
@@ -35,6 +61,7 @@ class NoiseModel:
 
     relative: float = 0.05
     absolute: float = 0.05
+    absolute_scale: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         for name in ("relative", "absolute"):
@@ -64,8 +91,8 @@ class NoiseModel:
             ) from None
         return cls(*numbers)
 
-    def standard_uncertainty(self, channel: str, intensity: np.ndarray) -> np.ndarray:
-        """Standard uncertainty of a channel, given the intensity at the same geometries; same shape."""
+    def standard_uncertainty(self, channel: str, intensity: np.ndarray, scale: np.ndarray) -> np.ndarray:
+        """See :class:`Noise`."""
         size = np.abs(intensity)
         median = float(np.nanmedian(size)) if np.isfinite(size).any() else 1.0
         floor = max(self.absolute * median, np.finfo(float).tiny)
@@ -75,3 +102,102 @@ class NoiseModel:
 
     def __str__(self) -> str:
         return f"{self.relative:.3g} of the intensity plus {self.absolute:.3g} of its median"
+
+
+@dataclass(frozen=True)
+class InstrumentNoise:
+    """What an imaging polarimeter states: relative accuracies, read noise and quantisation.
+
+    Variances add: for I, Q, U and DoLP the linear accuracy, for V the
+    circular one, each relative to I; read noise and a quantisation step Δ, which counts as Δ²/12, are on the
+    data's own scale.
+
+    Attributes
+    ----------
+    linear, circular
+        Relative accuracy for linear and for circular Stokes components, 1; the paper's imager states 1 % and
+        5 %.
+    read
+        Read noise, in the data's unit.
+    quantum
+        Quantisation step, in the data's unit: 1 for digital numbers.
+    """
+
+    linear: float = 0.01
+    circular: float = 0.05
+    read: float = 0.0
+    quantum: float = 0.0
+    absolute_scale: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        for name in ("linear", "circular", "read", "quantum"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0.0):
+                raise FitError(f"instrument noise: {name}={value!r} must be a number of 0 or more")
+        if self.linear == self.read == self.quantum == 0.0:
+            raise FitError("instrument noise: linear, read and quantum cannot all be 0")
+
+    def standard_uncertainty(self, channel: str, intensity: np.ndarray, scale: np.ndarray) -> np.ndarray:
+        """See :class:`Noise`."""
+        size = np.abs(intensity)
+        floor = scale * math.hypot(self.read, self.quantum / math.sqrt(12.0))
+        if channel == "dolp":
+            return np.hypot(self.linear, floor / np.maximum(size, np.finfo(float).tiny))
+        circular = channel == "V" or (channel.startswith("m") and "3" in channel)
+        relative = self.circular if circular else self.linear
+        return np.maximum(np.hypot(relative * size, floor), np.finfo(float).tiny)
+
+    def __str__(self) -> str:
+        return (
+            f"instrument: {self.linear:.3g} of the intensity on linear and {self.circular:.3g} on circular "
+            f"components, read noise {self.read:g}, quantisation step {self.quantum:g}"
+        )
+
+
+@dataclass(frozen=True)
+class EqualNoise:
+    """Equal weights for all values of all channels; their scale is estimated from the residuals."""
+
+    absolute_scale: ClassVar[bool] = False
+
+    def standard_uncertainty(self, channel: str, intensity: np.ndarray, scale: np.ndarray) -> np.ndarray:
+        """See :class:`Noise`."""
+        size = np.abs(intensity[np.isfinite(intensity)])
+        typical = float(np.sqrt((size**2).mean())) if size.size else 1.0
+        return np.full(intensity.shape, 1.0 if channel == "dolp" else max(typical, np.finfo(float).tiny))
+
+    def __str__(self) -> str:
+        return "equal weights"
+
+
+def parse_noise(text: str) -> Noise:
+    """Read a statement of the noise.
+
+    Parameters
+    ----------
+    text
+        ``"RELATIVE[,ABSOLUTE]"`` (:class:`NoiseModel`), ``"equal"`` (:class:`EqualNoise`), or
+        ``"instrument"``, ``"instrument:linear=1%,circular=5%,read=0.5,quantum=1"`` (:class:`InstrumentNoise`).
+
+    Raises
+    ------
+    FitError
+        If the text has another form.
+    """
+    head, _, rest = text.partition(":")
+    if head.strip() == "equal":
+        return EqualNoise()
+    if head.strip() != "instrument":
+        return NoiseModel.parse(text)
+    values: dict[str, float] = {}
+    for item in filter(None, (part.strip() for part in rest.split(","))):
+        name, sign, number = item.partition("=")
+        try:
+            if not sign or name.strip() not in ("linear", "circular", "read", "quantum"):
+                raise ValueError
+            values[name.strip()] = float(number[:-1]) / 100.0 if number.endswith("%") else float(number)
+        except ValueError:
+            raise FitError(
+                f"noise {text!r}: give instrument:linear=1%,circular=5%,read=0.5,quantum=1 or some of these"
+            ) from None
+    return InstrumentNoise(**values)

@@ -10,7 +10,7 @@ import numpy as np
 from pbrdf.data.conventions import qu_from_dolp_aolp
 from pbrdf.data.select import measured_channels, to_brdf_scale
 from pbrdf.errors import FitError
-from pbrdf.inversion.noise import NoiseModel
+from pbrdf.inversion.noise import Noise, NoiseModel
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -56,7 +56,9 @@ class Observations:
     scale: np.ndarray | None = None
 
     @classmethod
-    def from_dataset(cls, ds: xr.Dataset, noise: NoiseModel | None = None) -> Observations:
+    def from_dataset(
+        cls, ds: xr.Dataset, noise: Noise | None = None, objective: str = "stokes"
+    ) -> Observations:
         """Take what was measured from a valid data set.
 
         DoLP with AoLP becomes Q and U (their uncertainties propagated); DoLP alone is compared as it is.
@@ -68,6 +70,9 @@ class Observations:
             Data set of the project's schema, see :mod:`pbrdf.data.schema`.
         noise
             Stated noise; None takes the data set's uncertainties and :class:`NoiseModel` where there are none.
+        objective
+            ``"stokes"``: signed components as measured; ``"paper"``: intensity and DoLP with equal weights, each in
+            units of its root mean square (Zhang et al. 2017 say no more than "equal weights").
 
         Raises
         ------
@@ -107,13 +112,15 @@ class Observations:
             elif "dolp" in measured:
                 columns["dolp"], uncertainties["dolp"] = ds["dolp"].values, stated["dolp"]
         model = noise or NoiseModel()
+        if objective == "paper":
+            columns, uncertainties = _intensity_and_dolp(columns)
         known = True
         channels = tuple(name for name in columns if np.isfinite(columns[name]).any())
         for name in channels:
-            guess = model.standard_uncertainty(name, intensity)
-            given = np.isfinite(uncertainties[name]) & (noise is None)
+            guess = model.standard_uncertainty(name, intensity, scale)
+            given = np.isfinite(uncertainties[name]) & (noise is None or objective == "paper")
             finite = np.isfinite(columns[name])
-            known &= bool((given | ~finite).all())
+            known &= objective == "stokes" and (bool((given | ~finite).all()) or model.absolute_scale)
             uncertainties[name] = np.where(given, uncertainties[name], guess)
         values = np.stack([columns[name] for name in channels])
         std = np.stack([uncertainties[name] for name in channels])
@@ -166,6 +173,23 @@ def _std(ds: xr.Dataset, name: str) -> np.ndarray:
     if f"{name}_std" in ds.data_vars:
         return ds[f"{name}_std"].values
     return np.full(ds[name].shape, np.nan)
+
+
+def _intensity_and_dolp(
+    columns: dict[str, np.ndarray],
+) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+    """Intensity and DoLP with equal weights in units of their root mean squares."""
+    if "m00" in columns:
+        columns = {"I": columns["m00"], "Q": columns["m10"], "U": columns["m20"]}
+    if "I" not in columns or ("Q" not in columns and "dolp" not in columns):
+        raise FitError('objective "paper": intensity and linear polarisation must have been measured')
+    dolp = columns.get("dolp")
+    if dolp is None:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            dolp = np.hypot(columns["Q"], columns.get("U", np.zeros(1))) / columns["I"]
+        dolp = np.where(columns["I"] > 0.0, dolp, np.nan)
+    pair = {"I": columns["I"], "dolp": dolp}
+    return pair, {name: np.full(len(v), np.sqrt(np.nanmean(v**2))) for name, v in pair.items()}
 
 
 def _propagated(
