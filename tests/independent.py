@@ -7,6 +7,8 @@ Fresnel coefficients, polar coordinates in slope space with tanh-sinh nodes for 
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 from scipy import special
 
@@ -187,12 +189,12 @@ def slope_nodes(theta_i, theta_r, phi, sigma, step=0.05, far=9.5):
     cuts = np.append(cuts, 2 * np.pi) if cuts[-1] < 2 * np.pi - 1e-12 else cuts
     left, right, weight = tanh_sinh(step)
     found = []
-    for low, high in zip(cuts[:-1], cuts[1:], strict=True):
+    for low, high in itertools.pairwise(cuts):
         psi = np.where(left < 0.5, low + (high - low) * left, high - (high - low) * right)
         reach = np.full((2, psi.size), np.inf)
         for j in (0, 1):
             across = np.cos(psi - directions[j])
-            reach[j] = np.where(across > 0, c[j] / np.maximum(across, 1e-300), np.inf)
+            reach[j] = np.where(across > 0, c[j] / np.maximum(across, 1e-30), np.inf)
         radius = np.minimum(reach.min(0), far)
         r = radius[:, None] * left[None, :]
         w = r * np.exp(-0.5 * r * r) / (2 * np.pi) * radius[:, None] * weight[None, :]
@@ -203,10 +205,10 @@ def slope_nodes(theta_i, theta_r, phi, sigma, step=0.05, far=9.5):
         mu = []
         for j in (0, 1):
             plain = 1 - r * np.cos(psi - directions[j])[:, None] / c[j]
-            edge = ((reach[j] - radius)[:, None] + radius[:, None] * right) / reach[j][:, None]
             finite = np.isfinite(reach[j])[:, None]
-            with np.errstate(invalid="ignore"):
-                mu.append(cosines[j] * inverse * np.where(finite, edge, plain))
+            reach_j = np.where(finite[:, 0], np.minimum(reach[j], 1e12), 1.0)[:, None]
+            edge = (reach_j - radius[:, None] + radius[:, None] * right) / reach_j
+            mu.append(cosines[j] * inverse * np.where(finite, edge, plain))
         found.append([x.reshape(r.size, -1) for x in (m, *mu, w)])
     m, mu_i, mu_r, w = (np.concatenate(x) for x in zip(*found, strict=True))
     keep = (mu_i[:, 0] > 0) & (mu_r[:, 0] > 0)
@@ -251,7 +253,7 @@ def visible_integrals(theta_i, theta_r, phi, k, step=0.035):
     """
     w_i, w_r = rays(theta_i, theta_r, phi)
     e3 = np.cross(w_i, w_r)
-    e3 = e3 / np.linalg.norm(e3)
+    e3 = e3 / np.linalg.norm(e3) if np.linalg.norm(e3) > 1e-12 else np.array([0.0, 1.0, 0.0])
     e1 = (w_i + w_r) / np.linalg.norm(w_i + w_r)
     e2 = np.cross(e3, e1)
     half = 0.5 * np.arctan2(np.linalg.norm(np.cross(w_i, w_r)), w_i @ w_r)
@@ -262,7 +264,7 @@ def visible_integrals(theta_i, theta_r, phi, k, step=0.035):
     cuts = np.sort(cuts)
     left, right, weight = tanh_sinh(step, 3.6)
     area = total = 0.0
-    for low, high in zip(cuts[:-1], cuts[1:], strict=True):
+    for low, high in itertools.pairwise(cuts):
         psi = low + (high - low) * left
         from_low = (high - low) * left + (low + limit)  # ψ + limit
         from_high = (high - low) * right + (limit - high)  # limit − ψ
@@ -323,9 +325,8 @@ def reciprocal_block(theta_i, theta_r, phi, p, step=0.05):
 def diffuse_dolp(theta, n):
     """DoLP of light transmitted out of a smooth dielectric (Atkinson and Hancock), MODEL section 6."""
     s2 = np.sin(theta) ** 2
-    return (
-        (n - 1 / n) ** 2 * s2 / (2 + 2 * n**2 - (n + 1 / n) ** 2 * s2 + 4 * np.cos(theta) * np.sqrt(n**2 - s2))
-    )
+    root = np.sqrt(n**2 - s2)
+    return (n - 1 / n) ** 2 * s2 / (2 + 2 * n**2 - (n + 1 / n) ** 2 * s2 + 4 * np.cos(theta) * root)
 
 
 def wedge_probability(c_i, c_r, phi):

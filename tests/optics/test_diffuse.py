@@ -18,7 +18,9 @@ def test_formula(jit, unit):
     found = mrpv(*(jit(x) for x in (i, r, w, a, k, b))).numpy()
     np.testing.assert_allclose(found, a / np.pi * ((r + i) * r * i) ** (k - 1) * np.exp(b * w), rtol=1e-12)
     np.testing.assert_allclose(
-        minnaert_shape(jit(i), jit(r), jit(k)).numpy(), minnaert_shape(jit(r), jit(i), jit(k)).numpy(), rtol=1e-13
+        minnaert_shape(jit(i), jit(r), jit(k)).numpy(),
+        minnaert_shape(jit(r), jit(i), jit(k)).numpy(),
+        rtol=1e-13,
     )
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import independent as ref
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+import independent as ref
 from pbrdf.optics.fresnel import mueller_reflection, refraction_root, transmittances
 
 UNIT = arrays(float, (3, 64), elements=st.floats(0.0, 1.0))

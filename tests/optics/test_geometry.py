@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import independent as ref
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+import independent as ref
 from pbrdf.optics.geometry import cross, dot, geometry_from_angles
 
 VECTORS = ("omega_i", "omega_r", "p_i", "s_i", "p_r", "s_r", "facet")

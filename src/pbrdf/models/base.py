@@ -228,7 +228,7 @@ def load_model(source: str | os.PathLike[str] | Mapping[str, Any]) -> Model:
             ) from error
     if not isinstance(content, Mapping) or "model" not in content:
         raise ModelError(f'{where}not a model: the key "model" is missing')
-    cls = MODELS.get(content["model"])
+    cls = MODELS.get(content["model"]) if isinstance(content["model"], str) else None
     if cls is None:
         raise ModelError(f"{where}unknown model {content['model']!r}: known are {', '.join(MODELS)}")
     parameters, options = content.get("parameters"), content.get("options", {})
@@ -269,6 +269,8 @@ def _checked_value(parameter: Parameter, value: Any) -> Any:
             numbers = np.asarray(value, dtype=float)
         except (TypeError, ValueError) as error:
             raise ModelError(f"{parameter.name}={value!r} is not a number") from error
+        if numbers.size == 0:
+            raise ModelError(f"{parameter.name} is an empty array: give a number or an array of numbers")
         if numbers.ndim == 0:
             kept = float(numbers)
         elif isinstance(value, np.ndarray | Sequence):

@@ -64,10 +64,17 @@ def kernel_from_angles(model: Model, theta_i: Any, theta_r: Any, phi: Any, value
     """Mueller matrix (nested lists) from angles, 0 at and below the horizon; Dr.Jit floats, unchecked."""
     import drjit as dr
 
-    visible = (dr.cos(theta_i) > _HORIZON) & (dr.cos(theta_r) > _HORIZON)
-    theta_i, theta_r = dr.select(visible, theta_i, 0.0), dr.select(visible, theta_r, 0.0)
+    theta_i, theta_r, visible = horizon_guard(theta_i, theta_r)
     f = model.kernel(geometry_from_angles(theta_i, theta_r, phi), values, part)
     return [[0.0 if _is_zero(x) else dr.select(visible, x, 0.0) for x in row] for row in f]
+
+
+def horizon_guard(theta_i: Any, theta_r: Any) -> tuple[Any, Any, Any]:
+    """Zenith angles with those at and below the horizon moved to 0, and which are above it."""
+    import drjit as dr
+
+    visible = (dr.cos(theta_i) > _HORIZON) & (dr.cos(theta_r) > _HORIZON)
+    return dr.select(visible, theta_i, 0.0), dr.select(visible, theta_r, 0.0), visible
 
 
 def mueller(model: Model, theta_i: Any, theta_r: Any, phi: Any, part: str) -> Any:
@@ -81,7 +88,7 @@ def mueller(model: Model, theta_i: Any, theta_r: Any, phi: Any, part: str) -> An
 
 def stokes(model: Model, theta_i: Any, theta_r: Any, phi: Any, incident: Any, part: str) -> Any:
     """See :meth:`pbrdf.models.base.Model.stokes`."""
-    if is_drjit(incident) or (not isinstance(incident, Sequence) and np.ndim(incident) > 1):
+    if is_drjit(incident) or _depth(incident) > 1:
         return _apply(mueller(model, theta_i, theta_r, phi, part), incident)
     S = check_incident(incident)
 
@@ -117,6 +124,14 @@ def check_incident(incident: Any) -> list[float]:
     return S.tolist()
 
 
+def _depth(incident: Any) -> int:
+    """Number of dimensions, 1 for what is no array at all (the check of the numbers then says so)."""
+    try:
+        return np.ndim(incident)
+    except ValueError:  # ragged
+        return 1
+
+
 def _weighted_sum(row: Sequence[Any], weights: Sequence[float]) -> Any:
     total: Any = 0.0
     for value, weight in zip(row, weights, strict=True):
@@ -134,8 +149,11 @@ def _apply(matrix: Any, incident: Any) -> Any:
     import drjit as dr
 
     if is_drjit(matrix):
-        if dr.is_tensor_v(matrix):
-            raise ModelError("with tensor angles, give the incident Stokes vector as four plain numbers")
+        if dr.is_tensor_v(matrix) or not is_drjit(incident):
+            raise ModelError(
+                "with Dr.Jit angles, give the incident Stokes vector as four plain numbers or as an Array4f; with "
+                "tensors as four plain numbers"
+            )
         return matrix @ incident
     check_incident(incident)
     if type(matrix).__module__.startswith("xarray"):
@@ -146,7 +164,13 @@ def _apply(matrix: Any, incident: Any) -> Any:
                 "with xarray angles, give arrays of incident light as a DataArray over stokes_in"
             )
         return xr.dot(matrix, incident, dim="stokes_in")
-    return np.einsum("...ij,...j->...i", matrix, np.asarray(incident, dtype=float))
+    try:
+        return np.einsum("...ij,...j->...i", matrix, np.asarray(incident, dtype=float))
+    except ValueError:
+        raise ModelError(
+            f"incident of shape {np.shape(incident)} does not broadcast against Mueller matrices of shape "
+            f"{matrix.shape}"
+        ) from None
 
 
 def _evaluate(
@@ -293,6 +317,11 @@ def _evaluate_xarray(
     import xarray as xr
 
     named = {**angles, **model.values}
+    for name, value in named.items():
+        if not isinstance(value, xr.DataArray) and np.ndim(value) > 0:
+            raise ModelError(
+                f"{name} is a plain array beside xarray arrays: give it dimensions as a DataArray"
+            )
     arrays = dict(zip(named, xr.broadcast(*(xr.DataArray(v) for v in named.values())), strict=True))
     template = arrays["theta_i"]
     data = _evaluate_numpy(
@@ -325,7 +354,14 @@ def _evaluate_drjit(
 ) -> Any:
     import drjit as dr
 
-    given = [v for v in [*angles.values(), *model.values.values()] if is_drjit(v)]
+    named = {**angles, **model.values}
+    given = [v for v in named.values() if is_drjit(v)]
+    for name, value in named.items():
+        if not is_drjit(value) and np.ndim(value) > 0:
+            raise ModelError(f"{name} is not a Dr.Jit array beside others that are: convert it")
+    widths = {name: dr.width(v) for name, v in named.items() if is_drjit(v) and not dr.is_tensor_v(v)}
+    if len({w for w in widths.values() if w != 1}) > 1:
+        raise ModelError(f"Dr.Jit arrays of different widths do not broadcast: {widths}")
     tensors = [v for v in given if dr.is_tensor_v(v)]
     Array = type(tensors[0].array) if tensors else type(given[0])
     single = dr.type_v(Array) == dr.VarType.Float32
@@ -349,7 +385,10 @@ def _evaluate_drjit(
         values["kappa"] = None
     theta_i, theta_r, phi = (flatten(angles[name]) for name in ("theta_i", "theta_r", "phi"))
     f = kernel_from_angles(model, theta_i, theta_r, phi, values, part)
-    outputs = [Float(x) for x in function(f)]
+    # an opaque mask keeps each output a variable of its own: with constant angles it could be an inner node of
+    # the graph, whose derivative Dr.Jit discards
+    always = dr.opaque(dr.mask_t(Float), True)
+    outputs = [dr.select(always, Float(x), Float(0.0)) for x in function(f)]
     module, suffix = sys.modules[Float.__module__], "" if single else "64"
     if grid is None:
         if len(shape) == 2:

@@ -6,7 +6,7 @@ half-planes in slope space, at c_i = cotθ_i/σ and c_r = cotθ_r/σ standard de
 
 * Where both are far out (the paints below about 75°) a small cubature for the full Gaussian plane is
   enough: 12 points of degree 7 (Stroud, *Approximate Calculation of Multiple Integrals*, E2^{r²} 7-1) for
-  σ ≤ 0.06, 5 x 5 Gauss-Hermite points for σ ≤ 0.12.
+  σ ≤ 0.045, 5 x 5 Gauss-Hermite points for σ ≤ 0.12.
 * Elsewhere the wedge between the two half-planes is mapped smoothly onto the whole plane and the
   trapezoidal rule is used there, which converges exponentially for analytic integrands, with algebraic
   singularities at the edges of the wedge included: the map bends with softplus functions at the edges, so
@@ -32,7 +32,7 @@ __all__ = ["ACCURACIES", "CLEAR_WEDGE", "facet_average", "needs_wedge", "wedge_d
 #: Distance, in standard deviations of slope, beyond which the edge of the lit and seen wedge is ignored.
 CLEAR_WEDGE = 4.5
 #: Largest σ for the 12-point and for the 25-point rule.
-SIGMA_12, SIGMA_25 = 0.06, 0.12
+SIGMA_12, SIGMA_25 = 0.045, 0.12
 #: Bounds beyond this many standard deviations are out of reach of every node.
 _FAR = 50.0
 
@@ -50,9 +50,9 @@ class _Accuracy(NamedTuple):
     clear: bool = True
 
 
-#: ``draft`` is for searching (errors up to some 1e-3 where the wedge cuts in), ``high`` for reference values.
+#: ``draft`` is for searching (errors up to 1 % where the wedge cuts in), ``high`` for reference values.
 ACCURACIES: dict[str, _Accuracy] = {
-    "default": _Accuracy(0.9, 6, 2.0),
+    "default": _Accuracy(0.8, 7, 2.0),
     "high": _Accuracy(0.3, 24, 4.0, clear=False),
     "draft": _Accuracy(1.5, 3, 1.3),
 }

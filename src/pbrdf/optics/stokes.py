@@ -15,19 +15,19 @@ __all__ = ["aolp", "docp", "dolp", "dop"]
 def dolp(stokes: Any) -> Any:
     """Degree of linear polarisation, √(Q² + U²)/I."""
     intensity, q, u, _ = _components(stokes)
-    return _sqrt(q * q + u * u) / intensity
+    return _ratio(_sqrt(q * q + u * u), intensity)
 
 
 def docp(stokes: Any) -> Any:
     """Degree of circular polarisation, |V|/I."""
     intensity, _, _, v = _components(stokes)
-    return abs(v) / intensity
+    return _ratio(abs(v), intensity)
 
 
 def dop(stokes: Any) -> Any:
     """Degree of polarisation, √(Q² + U² + V²)/I."""
     intensity, q, u, v = _components(stokes)
-    return _sqrt(q * q + u * u + v * v) / intensity
+    return _ratio(_sqrt(q * q + u * u + v * v), intensity)
 
 
 def aolp(stokes: Any) -> Any:
@@ -65,6 +65,15 @@ def _components(stokes: Any) -> tuple[Any, Any, Any, Any]:
             f"a Stokes array has four numbers in its last dimension, got the shape {array.shape}"
         )
     return tuple(array[..., i] for i in range(4))  # type: ignore[return-value]
+
+
+def _ratio(part: Any, intensity: Any) -> Any:
+    if _is_drjit(part):
+        return part / intensity
+    import numpy as np
+
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return part / intensity
 
 
 def _sqrt(value: Any) -> Any:

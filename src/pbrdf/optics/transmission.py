@@ -103,21 +103,25 @@ def _transmission_vector(m: Any, mu: Any, p: Any, s: Any, n: Any, kappa: Any | N
     return mean, half * q, half * u
 
 
-# Double-exponential (tanh-sinh) rule on (−1, 1): points from the nearer end and weights
-def _tanh_sinh(step: float, half: int) -> tuple[list[float], list[float]]:
-    points, weights = [], []
+def _tanh_sinh(step: float, half: int) -> tuple[list[float], list[float], list[float]]:
+    """Double-exponential rule on (−1, 1): distances of the points from both ends, and weights.
+
+    The distances are given rather than the points, because an integrand with an algebraic end point needs them
+    to full relative precision.
+    """
+    from_low, from_high, weights = [], [], []
     for j in range(-half, half + 1):
-        z = j * step
-        u = 0.5 * math.pi * math.sinh(z)
-        points.append(math.tanh(u))
-        weights.append(step * 0.5 * math.pi * math.cosh(z) / math.cosh(u) ** 2)
-    return points, weights
+        u = 0.5 * math.pi * math.sinh(j * step)
+        from_low.append(math.exp(u) / math.cosh(u))
+        from_high.append(math.exp(-u) / math.cosh(u))
+        weights.append(step * 0.5 * math.pi * math.cosh(j * step) / math.cosh(u) ** 2)
+    return from_low, from_high, weights
 
 
 _VISIBLE_RULES = {
-    "default": _tanh_sinh(0.22, 14),
-    "high": _tanh_sinh(0.1, 33),
-    "draft": _tanh_sinh(0.35, 8),
+    "default": _tanh_sinh(0.13, 32),
+    "high": _tanh_sinh(0.06, 70),
+    "draft": _tanh_sinh(0.26, 14),
 }
 _SERIES_TERMS = {"default": 20, "high": 32, "draft": 10}
 
@@ -150,7 +154,7 @@ def visible_means(geometry: Geometry, k: Any, accuracy: str = "default") -> tupl
     limit = 0.5 * math.pi - beta
     # g(ψ) = cosψ h_z + sinψ q_z changes sign at the horizon; positive at ψ = 0
     crossing = dr.clip(-dr.atan2(h_z * dr.select(q_z < 0.0, -1.0, 1.0), dr.abs(q_z)), -limit, limit)
-    points, weights = (F(column) for column in _VISIBLE_RULES[accuracy])
+    from_low, from_high, weights = (F(column) for column in _VISIBLE_RULES[accuracy])
     count = len(_VISIBLE_RULES[accuracy][0])
     terms = _SERIES_TERMS[accuracy]
     a = 1.5 * (k - 1.0)
@@ -158,15 +162,22 @@ def visible_means(geometry: Geometry, k: Any, accuracy: str = "default") -> tupl
     whole = 2.0 * (_from_zero(half_y, a, terms) + _to_one(half_y, a, terms))
 
     def body(j: Any, total: Any, state: Any) -> tuple[Any, ...]:
-        a, k, whole, cos_beta, limit, crossing, h_z, q_z, s_z2 = state
+        a, k, whole, beta, cos_beta, limit, crossing, h_z, q_z, s_z2 = state
         second = j >= count
         index = dr.select(second, j - count, j)
-        x, weight = dr.gather(F, points, index), dr.gather(F, weights, index)
+        above, below, weight = (dr.gather(F, column, index) for column in (from_low, from_high, weights))
         low, high = dr.select(second, crossing, -limit), dr.select(second, limit, crossing)
         half_width = 0.5 * (high - low)
-        psi = dr.fma(half_width, x, 0.5 * (low + high))
-        sin_psi, cos_psi = dr.sincos(psi)
-        product = cos_psi * dr.sin(limit - psi) * dr.sin(limit + psi) * 2.0 * cos_beta
+        # distances of ψ from −limit and from +limit, without cancellation at the segment's own end there
+        above = dr.fma(half_width, above, dr.select(second, crossing + limit, 0.0))
+        below = dr.fma(half_width, below, dr.select(second, 0.0, limit - crossing))
+        psi = 0.5 * (above - below)
+        sin_psi = dr.sin(psi)
+        cos_psi = dr.sin(dr.minimum(above, below) + beta)
+        # cos(ψ+β) = sin(above) and cos(ψ−β) = sin(below), by whichever distance is the smaller angle
+        cos_plus = dr.sin(dr.minimum(above, below + 2.0 * beta))
+        cos_minus = dr.sin(dr.minimum(below, above + 2.0 * beta))
+        product = cos_psi * cos_plus * cos_minus * 2.0 * cos_beta
         g = dr.fma(cos_psi, h_z, sin_psi * q_z)
         y = s_z2 / dr.maximum(dr.fma(g, g, s_z2), 1e-300 if _double(F) else 1e-30)  # 1 − x0²
         near_end = y <= 0.5
@@ -178,7 +189,7 @@ def visible_means(geometry: Geometry, k: Any, accuracy: str = "default") -> tupl
         shape = dr.exp((k - 1.0) * dr.log(dr.select(valid, product, 1.0)))
         return j + 1, dr.fma(dr.select(valid, weight * half_width, 0.0), shape * inner, total), state
 
-    state = (a, k, whole, cos_beta, limit, crossing, h_z, q_z, s_z2)
+    state = (a, k, whole, beta, cos_beta, limit, crossing, h_z, q_z, s_z2)
     integral = dr.while_loop(
         (UInt(0), dr.zeros(F, 1), state), lambda j, *_: j < 2 * count, body, label="lune", max_iterations=-1
     )[1]
