@@ -15,7 +15,7 @@ __all__ = ["fail", "output_console", "progress_bar", "reading_width", "warn"]
 #: Lines longer than this are hard to read, however wide the terminal is.
 _WIDEST = 110
 #: Width where there is no terminal to ask, as in a pipe.
-_WITHOUT_TERMINAL = 100
+_WITHOUT_TERMINAL = 110
 
 
 def reading_width() -> int | None:

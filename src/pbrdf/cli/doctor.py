@@ -54,9 +54,7 @@ def doctor(backend: Backend = None) -> None:
     failed = sum(not check.passed for check in results)
     if failed:
         sys.stdout.flush()
-        fail(
-            f"{failed} of {len(results)} checks failed: results from this machine cannot be trusted; report this"
-        )
+        fail(f"{failed} of {len(results)} checks failed: do not trust results from this machine; report this")
         raise typer.Exit(BROKEN)
     print("\nAll is well.")
 

@@ -1,4 +1,4 @@
-"""``pbrdf check`` and ``pbrdf convert``: is a file understood, and the same data in the project's own form."""
+"""``pbrdf check`` and ``pbrdf convert``: is a file understood, and its data in our own form."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from pbrdf.cli.reading import Reading, with_reading_options
+from pbrdf.cli.values import require_folder_of
 
 __all__ = ["check", "convert"]
 
@@ -45,6 +46,7 @@ def convert(
     """Write a file of data in the project's own CSV or netCDF form."""
     from pbrdf.data import write
 
+    require_folder_of(output)
     dataset = reading.open(file)
     write(dataset, output)
     print(f"{output}: {dataset.sizes['geometry']} geometries")

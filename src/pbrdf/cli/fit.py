@@ -27,7 +27,7 @@ Backend = Annotated[
 def fit(
     files: Annotated[
         list[str],
-        typer.Argument(metavar="FILE...", help="Files of measured data, or bundled paints; each is fitted."),
+        typer.Argument(metavar="FILE", help="Files of measured data, or bundled paints; each is fitted."),
     ],
     *,
     reading: Reading,
@@ -62,7 +62,7 @@ def fit(
         typer.Option(
             help="Noise relative to the intensity, and absolute in units of its median, e.g. 0.02,0.001.",
             metavar="REL[,ABS]",
-            show_default="the uncertainties in the data, else 0.02,0.001",
+            show_default="the uncertainties in the data, else an assumption that is printed",
         ),
     ] = None,
     hold_out: Annotated[
@@ -93,11 +93,12 @@ def fit(
 ) -> None:
     """Fit a model to measured data, and say how well each parameter is known.
 
-    Writes a folder with summary.txt, figure.png, model.json, fit.json (all numbers), comparison.nc (measured,
-    modelled, residual) and starts.png.
+    Writes a folder with summary.txt, figure.png, model.json, fit.json (all numbers), comparison.nc
+    (measured, modelled, residual) and starts.png.
 
-    Examples: `pbrdf fit matte-white-thick --hold-out group=3` (bundled data);
-    `pbrdf fit paint.csv --column I=f_r_per_sr --noise 3% --fix n=1.5`
+    With bundled data: `pbrdf fit matte-white-thick --hold-out group=3`
+
+    With your own: `pbrdf fit paint.csv --column I=f_r_per_sr --noise 3%,1% --fix n=1.5`
     """
     from pbrdf.report.files import FIGURE_FORMATS, require_writable, write_report
     from pbrdf.report.subject import Report

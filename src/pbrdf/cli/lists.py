@@ -42,8 +42,8 @@ def paints(as_json: AsJson = False) -> None:
     console.print(table)
     console.print(f"\nModel double-gauss at {WAVELENGTH:g} nm. Source: {_SOURCE}; {_SCALE}.")
     console.print(
-        "Each name stands for the model in `pbrdf simulate` and `pbrdf plot`, and for a simulated measurement in "
-        "`pbrdf fit` and `pbrdf check`."
+        "Each name stands for the model in `pbrdf simulate` and `pbrdf plot`, and for a simulated "
+        "measurement in `pbrdf fit` and `pbrdf check`."
     )
 
 
@@ -52,6 +52,7 @@ def models(as_json: AsJson = False) -> None:
     from rich.table import Table
 
     from pbrdf.models import MODELS
+    from pbrdf.report.numbers import brief
 
     if as_json:
         content = {
@@ -81,8 +82,8 @@ def models(as_json: AsJson = False) -> None:
         for title in ("  parameter", "meaning", "unit", "bounds of a fit", "if not fitted"):
             table.add_column(title)
         for p in model.parameters:
-            fitted = f"{p.lower:g} … {p.upper:g}" + ("" if p.fitted else " with --free")
-            table.add_row(f"  {p.name}", p.description, p.unit, fitted, f"{p.default:g}")
+            fitted = f"{brief(p.lower)} … {brief(p.upper)}" + ("" if p.fitted else " with --free")
+            table.add_row(f"  {p.name}", p.description, p.unit, fitted, brief(p.default))
         console.print(table)
         for option, choices in model.options.items():
             console.print(f"  --option {option}={'|'.join(choices)}", markup=False)

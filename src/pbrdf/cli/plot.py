@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from pbrdf.cli.reading import Reading, with_reading_options
+from pbrdf.cli.values import require_folder_of
 from pbrdf.errors import PbrdfError
 
 __all__ = ["plot"]
@@ -41,6 +42,7 @@ def plot(
     target = output or Path(f"{Path(source).stem}.png")
     if target.exists() and target.resolve() == Path(source).resolve():
         raise PbrdfError(f"{target}: this is the file to draw; name another with --output")
+    require_folder_of(target)
     is_model = source.endswith(".json") or (source in PAINTS and not Path(source).exists())
     if is_model:
         if given := reading.stated():

@@ -85,6 +85,8 @@ class Reading:
         for name, example in (("column", "I=f_r_per_sr"), ("where", "material=white")):
             if name in options:
                 options[name] = pairs(options[name], f"--{name}", example)
+        if Path(source).is_dir():
+            raise DataError(f"{source}: this is a folder; name a file in it")
         if Path(source).exists():
             try:
                 dataset = read(source, **options)
@@ -134,7 +136,7 @@ def _selected(dataset: xr.Dataset, kind: str, text: str, source: str) -> xr.Data
         available = [f"{v:g}" for v in np.unique(np.round(values, 2))]
     if not keep.any():
         shown = ", ".join(available[:20]) + (" …" if len(available) > 20 else "")
-        raise DataError(f"{source}: nothing has {kind}={text}; there is {shown}")
+        raise DataError(f"{source}: nothing has {kind}={text}; there are {shown}")
     return dataset.isel(geometry=keep)
 
 

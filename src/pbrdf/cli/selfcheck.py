@@ -99,7 +99,7 @@ def _realisable() -> Check:
 
 
 def _reference_value() -> Check:
-    """First column of one matrix of the table computed independently (``tests/data_oracle/double_gauss.csv``)."""
+    """First column of a matrix from the independent table ``tests/data_oracle/double_gauss.csv``."""
     paint = DoubleGauss(
         sigma=0.05789375933198998,
         n=1.3533264781109533,

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from pbrdf.cli.fit import Backend
-from pbrdf.cli.values import angles, stokes_vector
+from pbrdf.cli.values import angles, require_folder_of, stokes_vector
 from pbrdf.errors import PbrdfError
 
 if TYPE_CHECKING:
@@ -20,6 +21,8 @@ __all__ = ["simulate"]
 
 _GRID = {"theta_i": "10:80:10", "theta_r": "0:85:5", "phi": "0:360:15"}
 _PLANE_THETA_R = "-85:85:1"
+#: A relative noise alone.
+_PLAIN_NUMBER = re.compile(r"\s*[\d.eE+-]+\s*%?\s*")
 _BISTATIC_THETA_R = "-85:85:1"
 #: About 16 GB of Mueller matrices; more is a slip of the pen.
 _MOST_GEOMETRIES = 20_000_000
@@ -46,7 +49,7 @@ def simulate(
     bistatic: Annotated[
         str | None,
         typer.Option(
-            help="In plane, the sample turning between a fixed source and camera: the angles between these two.",
+            help="In plane, the sample turning between a fixed source and camera: the angles between them.",
             metavar="ANGLES",
         ),
     ] = None,
@@ -58,7 +61,7 @@ def simulate(
     noise: Annotated[
         str | None,
         typer.Option(
-            help="Add noise relative to the intensity (and absolute, in units of its median, by default 0.001).",
+            help="Add noise relative to the intensity, and absolute in units of its median, e.g. 0.01,0.001.",
             metavar="REL[,ABS]",
         ),
     ] = None,
@@ -67,15 +70,16 @@ def simulate(
 ) -> None:
     """Evaluate a model on a grid of directions, or in the plane of incidence.
 
-    Examples: `pbrdf simulate pearl-white -o grid.nc`;
-    `pbrdf simulate paint.json --bistatic 60,80,100 --noise 0.01 -o run.csv`
+    On a grid: `pbrdf simulate pearl-white -o grid.nc`
+
+    A measurement: `pbrdf simulate model.json --bistatic 60,80,100 --noise 0.01 -o run.csv`
     """
     import numpy as np
 
     import pbrdf
     from pbrdf.data import write
     from pbrdf.data.paints import PAINTS, WAVELENGTH, load_paint
-    from pbrdf.inversion import NoiseModel
+    from pbrdf.inversion.noise import parse_noise
     from pbrdf.models import load_model
 
     if plane and bistatic is not None:
@@ -90,8 +94,10 @@ def simulate(
         raise PbrdfError("--mueller holds every illumination: leave --incident out")
     if output.suffix.lower() not in (".nc", ".csv"):
         raise PbrdfError(f"--output {output}: the extension must be .nc or .csv")
+    require_folder_of(output)
     light = stokes_vector(incident, "--incident")
-    stated = None if noise is None else NoiseModel.parse(noise)
+    # The absolute part that a fit assumes is for real data with stray light: none is added here unasked.
+    stated = None if noise is None else parse_noise(f"{noise},0" if _PLAIN_NUMBER.fullmatch(noise) else noise)
     if backend is not None:
         pbrdf.set_backend(backend)
     bundled = source in PAINTS and not Path(source).exists()
@@ -115,7 +121,7 @@ def simulate(
         illumination=light,
         simulated=True,
         attrs={
-            "title": f"Simulation of {Path(source).stem} with the model {model.name}",
+            "title": f"Simulation with {source} (model {model.name})",
             "source": f"SIMULATED by pbrdf {pbrdf.__version__}: {model!r}"
             + (f", noise {stated}, seed {seed}" if stated else ", without noise"),
         },
@@ -136,11 +142,9 @@ def _directions(
         total, s = (a.ravel() for a in np.meshgrid(between, views, indexing="ij"))
         group = np.repeat(np.arange(1, len(between) + 1), len(views))
         incidence = total - s
-        # Beyond the normal the source is on the other side: the mirror image is measured.
-        s, incidence = np.where(incidence < 0.0, -s, s), np.abs(incidence)
-        seen = incidence < 90.0
+        seen = (incidence >= 0.0) & (incidence < 90.0)
         if not seen.any():
-            raise PbrdfError("--bistatic: with these viewing angles the source is always below the horizon")
+            raise PbrdfError("--bistatic: with these viewing angles the source is never between 0° and 90°")
         return _checked(incidence[seen], np.abs(s[seen]), np.where(s[seen] < 0.0, 180.0, 0.0), group[seen])
     incidences = angles(theta_i or _GRID["theta_i"], "--theta-i")
     views = angles(theta_r or (_PLANE_THETA_R if plane else _GRID["theta_r"]), "--theta-r")
@@ -157,7 +161,7 @@ def _directions(
     group = np.repeat(labels, len(views) * len(azimuths))
     if plane:
         return _checked(grids[0], np.abs(grids[1]), np.where(grids[1] < 0.0, 180.0, 0.0), group)
-    return _checked(*grids, group)
+    return _checked(grids[0], grids[1], grids[2], group)
 
 
 def _checked(
@@ -195,10 +199,15 @@ def _evaluate(
     if noise is None:
         return columns, {}
     draw = np.random.default_rng(seed)
+    exact = np.ones_like(intensity)
     std = {}
-    for name in columns:
-        width = noise.standard_uncertainty("m00" if mueller else name, intensity)
-        width = np.broadcast_to(width[:, None, None], columns[name].shape) if mueller else width
-        std[name] = width
-        columns[name] = columns[name] + width * draw.standard_normal(columns[name].shape)
+    for name, values in columns.items():
+        if name == "mueller":
+            widths = [
+                [noise.standard_uncertainty(f"m{i}{j}", intensity, exact) for j in range(4)] for i in range(4)
+            ]
+            std[name] = np.moveaxis(np.array(widths), -1, 0)
+        else:
+            std[name] = noise.standard_uncertainty(name, intensity, exact)
+        columns[name] = values + std[name] * draw.standard_normal(values.shape)
     return columns, std

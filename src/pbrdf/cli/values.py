@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from pathlib import Path
 
 from pbrdf.errors import PbrdfError
 
-__all__ = ["angles", "bounds", "number", "numbers", "pairs", "stokes_vector"]
+__all__ = ["angles", "bounds", "number", "numbers", "pairs", "require_folder_of", "stokes_vector"]
 
 #: More values than this in one list are a slip of the pen.
 _MOST_VALUES = 100_000
@@ -102,3 +103,9 @@ def stokes_vector(text: str, option: str) -> tuple[float, float, float, float]:
         raise PbrdfError(f"{option} {text!r}: give natural or four numbers I,Q,U,V, for example 1,0.5,0,0")
     i, q, u, v = (number(part, option) for part in parts)
     return (i, q, u, v)
+
+
+def require_folder_of(file: Path) -> None:
+    """Check, before any work, that there is a folder for a file to be written into; raises PbrdfError."""
+    if not file.parent.is_dir():
+        raise PbrdfError(f"{file}: there is no folder {file.parent}")

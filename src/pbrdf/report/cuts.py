@@ -1,9 +1,9 @@
 """Cuts through the plane of incidence: which measured points lie on one curve, and that curve drawn densely.
 
-In the plane of incidence a geometry is two numbers, θ_i and the signed viewing angle s = ±θ_r (negative on the
-source's side). Goniometers move along simple lines in that plane: a fixed source (θ_i constant), a fixed viewer
-(s constant), or a turning sample between a fixed source and a fixed viewer (θ_i + s, the bistatic angle,
-constant). Whichever of these explains the points with the fewest lines is taken.
+In the plane of incidence a geometry is two numbers, θ_i and the signed viewing angle s = ±θ_r (negative on
+the source's side). Goniometers move along simple lines in that plane: a fixed source (θ_i constant), a fixed
+viewer (s constant), or a turning sample between a fixed source and a fixed viewer (θ_i + s, the bistatic
+angle, constant). Whichever of these explains the points with the fewest lines is taken.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _AZIMUTH_TOLERANCE = 1.0
 _ANGLE_GAP = 0.3
 #: Step of a drawn curve, degrees: narrow enough for a specular peak of σ = 0.005.
 _STEP = 0.1
-#: With fewer points per cut than this on average there are no cuts, only scattered points.
+#: With fewer directions per cut than this on average there are no cuts, only scattered points.
 _FEWEST_POINTS = 3
 #: Measured points further apart than this are not joined, degrees.
 _WIDEST_GAP = 35.0
@@ -85,21 +85,23 @@ def in_plane_cuts(points: Points) -> list[Cut]:
     constants = {"theta_i": points.theta_i, "bistatic": points.theta_i + s, "theta_r": s}
     choices = {kind: _split(points.group, constants[kind], rows) for kind in KINDS}
     kind = min(choices, key=lambda k: len(choices[k]))
-    if len(rows) < _FEWEST_POINTS * len(choices[kind]):
-        return []
     x = points.theta_i if kind == "theta_r" else s
-    cuts = []
+    cuts, directions = [], 0
     for members in choices[kind]:
         members = members[np.argsort(x[members], kind="stable")]
         constant = float(np.median(constants[kind][members]))
         cuts.append(
             Cut(kind, constant, str(points.group[members[0]]), members, x[members], _path(x[members]))
         )
-    return cuts
+        directions += np.unique(np.round(x[members], 1)).size
+    if directions < _FEWEST_POINTS * len(cuts):
+        return []
+    # Angles ascend in the legend; positions of a camera keep the order of the file.
+    return cuts if kind == "bistatic" else sorted(cuts, key=lambda cut: cut.constant)
 
 
 def _split(group: np.ndarray, constant: np.ndarray, rows: np.ndarray) -> list[np.ndarray]:
-    """Rows of one group whose constant is the same within the gap, in the order of appearance of the groups."""
+    """Rows of one group whose constant is the same within the gap; groups in the order of the file."""
     parts = []
     for label in dict.fromkeys(group[rows]):
         members = rows[group[rows] == label]
@@ -111,9 +113,12 @@ def _split(group: np.ndarray, constant: np.ndarray, rows: np.ndarray) -> list[np
 
 def _path(x: np.ndarray) -> np.ndarray:
     """Dense values through ascending ``x``, NaN where neighbours are too far apart to join."""
-    pieces = []
+    pieces: list[np.ndarray] = []
     for piece in np.split(x, np.flatnonzero(np.diff(x) > _WIDEST_GAP) + 1):
         count = int(np.ceil((piece[-1] - piece[0]) / _STEP)) + 1
         # The points themselves are on the curve too, so that it passes through a narrow peak's top.
-        pieces += [np.unique(np.concatenate([np.linspace(piece[0], piece[-1], count), piece])), [np.nan]]
+        pieces += [
+            np.unique(np.concatenate([np.linspace(piece[0], piece[-1], count), piece])),
+            np.array([np.nan]),
+        ]
     return np.concatenate(pieces[:-1])

@@ -12,7 +12,15 @@ from pbrdf.data.select import measured_channels
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["cautions", "describe", "illumination_in_words", "wavelengths_in_words"]
+    from pbrdf.models.parameters import Parameter
+
+__all__ = [
+    "cautions",
+    "describe",
+    "illumination_in_words",
+    "shown_unit",
+    "wavelengths_in_words",
+]
 
 _QUANTITIES = {
     "brdf": "BRDF, 1/sr",
@@ -39,8 +47,8 @@ def describe(ds: xr.Dataset) -> list[str]:
         lines.append(f"{words} {name}: {span}")
     kind = "simulated" if ds.attrs.get("simulated") else "measured"
     lines.append(
-        f"{kind} {', '.join(channels)} ({_QUANTITIES[ds.attrs['quantity']]}), {illumination_in_words(ds)}; standard "
-        f"uncertainties of {', '.join(uncertain) if uncertain else 'nothing'}"
+        f"{kind} {', '.join(channels)} ({_QUANTITIES[ds.attrs['quantity']]}), {illumination_in_words(ds)}; "
+        f"standard uncertainties of {', '.join(uncertain) if uncertain else 'nothing'}"
     )
     return lines
 
@@ -72,6 +80,11 @@ def wavelengths_in_words(ds: xr.Dataset) -> str:
     if not known.size:
         return "wavelength not stated"
     return f"{_listed([f'{w:g}' for w in known])} nm"
+
+
+def shown_unit(parameter: Parameter) -> tuple[float, str]:
+    """Factor and unit in which people and files see a parameter: angles in degrees."""
+    return (180.0 / np.pi, "°") if parameter.unit == "rad" else (1.0, parameter.unit)
 
 
 def _listed(names: list[str]) -> str:

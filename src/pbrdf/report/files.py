@@ -14,12 +14,15 @@ import numpy as np
 import pbrdf
 from pbrdf.data.storage import exact_degrees
 from pbrdf.errors import DataError
+from pbrdf.report.describe import shown_unit
 from pbrdf.report.numbers import plain
 from pbrdf.report.subject import Report
 from pbrdf.report.summary import summary_text
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from pbrdf.inversion.fit import Estimate
 
 __all__ = ["FIGURE_FORMATS", "comparison_file", "fit_record", "require_writable", "write_report"]
 
@@ -106,8 +109,10 @@ def _beside(directory: Path) -> Path:
 
 
 def fit_record(report: Report) -> dict[str, Any]:
-    """Everything a program may want to know of a fit, in types that JSON has (NaN as None)."""
+    """Everything a program may want to know of a fit, in types that JSON has (NaN as None), angles in
+    degrees."""
     result = report.result
+    factor = {name: shown_unit(e.parameter)[0] for name, e in result.estimates.items()}
     record = {
         "pbrdf": pbrdf.__version__,
         "data": {
@@ -122,23 +127,17 @@ def fit_record(report: Report) -> dict[str, Any]:
         },
         "settings": dict(report.settings),
         "model": result.model.to_dict(),
-        "estimates": {
-            name: {
-                "value": e.value,
-                "standard_error": e.std,
-                "unit": e.parameter.unit,
-                "lower": e.lower,
-                "upper": e.upper,
-                "verdict": e.verdict,
-            }
-            for name, e in result.estimates.items()
-        },
+        "estimates": {name: _estimate(e) for name, e in result.estimates.items()},
         "correlation": {
             "parameters": [str(n) for n in result.correlation["parameter"].values],
             "matrix": result.correlation.values,
         },
         "goodness": asdict(result.goodness),
-        "optima": [asdict(optimum) for optimum in result.optima],
+        "optima": [
+            {**asdict(o), "values": {name: v * factor[name] for name, v in o.values.items()}}
+            for o in result.optima
+        ],
+        "stages": [asdict(stage) for stage in result.stages],
         "starts": result.starts,
         "converged": result.converged,
         "noise": result.noise,
@@ -151,6 +150,18 @@ def fit_record(report: Report) -> dict[str, Any]:
     return plain(record)  # type: ignore[return-value]
 
 
+def _estimate(estimate: Estimate) -> dict[str, Any]:
+    factor, unit = shown_unit(estimate.parameter)
+    return {
+        "value": factor * estimate.value,
+        "standard_error": factor * estimate.std,
+        "unit": "degree" if unit == "°" else unit,
+        "lower": factor * estimate.lower,
+        "upper": factor * estimate.upper,
+        "verdict": estimate.verdict,
+    }
+
+
 def comparison_file(report: Report) -> xr.Dataset:
     """Measured, modelled and residual values as they stand in the file: angles in degrees, described."""
     result = report.result
@@ -159,7 +170,7 @@ def comparison_file(report: Report) -> xr.Dataset:
         radians = ds[name].values
         degrees = exact_degrees(radians)
         ds[name] = (ds[name].dims, np.rad2deg(radians) if degrees is None else degrees, {"units": "degree"})
-    for name in ("held_out", "near_specular"):
+    for name in [str(n) for n in ds.data_vars if ds[n].dtype == bool]:
         ds[name] = (
             ds[name].astype(np.int8).assign_attrs(long_name=name.replace("_", " "), flag_values="0 no, 1 yes")
         )

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from pbrdf.errors import ModelError
-from pbrdf.report.figures import dress_hemisphere
+from pbrdf.report.panels import VIEWING_ANGLE, dress_hemisphere
 from pbrdf.report.style import BLUE, GREY, RED, new_figure, styled
 
 if TYPE_CHECKING:
@@ -26,9 +26,9 @@ _DECADES = 4.0
 def model_figure(model: Model, theta_i: float, name: str) -> Figure:
     """Reflected light over the hemisphere and in the plane of incidence, for natural light.
 
-    Four panels: intensity and degree of linear polarisation in every viewing direction (forward on the right);
-    intensity and the signed polarisation Q/I in the plane of incidence, with its two parts: Q/I < 0 is
-    polarised as by reflection, Q/I > 0 as by transmission out of the coating.
+    Four panels: intensity and degree of linear polarisation in every viewing direction (forward on the
+    right); intensity and the signed polarisation Q/I in the plane of incidence, with its two parts: Q/I < 0
+    is polarised as by reflection, Q/I > 0 as by transmission out of the coating.
 
     Parameters
     ----------
@@ -85,11 +85,13 @@ def _draw_hemispheres(figure: Figure, axes: list[Axes], model: Model, theta_i: f
         (axes[0], intensity, norm, "intensity (1/sr)"),
         (axes[1], dolp, Normalize(0.0, float(np.nanmax(dolp))), "degree of linear polarisation"),
     ):
-        ax.grid(False)
         mesh = ax.pcolormesh(
             azimuth, theta_r, values, norm=scale, cmap="viridis", shading="gouraud", rasterized=True
         )
         dress_hemisphere(ax)
+        ax.set_axisbelow(False)
+        ax.grid(color="white", linewidth=0.5, alpha=0.5)
+        ax.tick_params(axis="y", labelcolor="white")
         figure.colorbar(mesh, ax=ax, label=label, shrink=0.85, pad=0.1)
         ax.plot([np.pi], [theta_i], marker="*", color=RED, markersize=9, clip_on=False)
         ax.set_title(f"all viewing directions (★ source at {theta_i:g}°)", fontsize=9.5)
@@ -100,7 +102,7 @@ def _draw_plane(axes: list[Axes], model: Model, theta_i: float) -> None:
     angles = np.deg2rad(theta_i), np.deg2rad(np.abs(s)), np.where(s < 0.0, np.pi, 0.0)
     parts = {part: model.stokes(*angles, part=part) for part in ("total", "specular", "diffuse")}
     total = parts["total"]
-    styles = {
+    styles: dict[str, dict[str, Any]] = {
         "total": {"color": "black", "linewidth": 1.8},
         "specular": {"color": BLUE, "linestyle": "--"},
         "diffuse": {"color": RED, "linestyle": "-."},
@@ -122,7 +124,7 @@ def _draw_plane(axes: list[Axes], model: Model, theta_i: float) -> None:
         ax.axvline(theta_i, color=GREY, linewidth=0.7, linestyle=":")
         ax.set_xlim(-90.0, 90.0)
         ax.set_xticks(np.arange(-90, 91, 30))
-        ax.set_xlabel("viewing angle θr (°), negative on the source's side")
+        ax.set_xlabel(VIEWING_ANGLE)
     left.set_title("plane of incidence", fontsize=9.5)
     right.set_title("polarised by reflection below 0, by transmission above", fontsize=9.5)
     left.legend(frameon=False)

@@ -6,6 +6,8 @@ import math
 
 __all__ = ["brief", "per_cent", "plain", "with_error"]
 
+#: Error, relative to the value, below which the value is as good as exact: simulated data without noise.
+_EXACT = 1e-9
 #: Decimal places beyond which a power of ten is easier to read.
 _MOST_DECIMALS = 7
 
@@ -22,6 +24,8 @@ def with_error(value: float, error: float) -> str:
     """
     if not (math.isfinite(value) and math.isfinite(error) and error > 0.0):
         return brief(value)
+    if error < _EXACT * abs(value):
+        return f"{value:.10g} ± {error:.1e}".replace("-", "−")
     # Rounding first: 0.0996 is 0.10 to two digits, not 0.100.
     exponent = math.floor(math.log10(float(f"{error:.1e}")))
     decimals = 1 - exponent
@@ -38,7 +42,8 @@ def brief(value: float, digits: int = 4) -> str:
     """A number with a few significant digits and a true minus sign; ``–`` for NaN."""
     if not math.isfinite(value):
         return "–" if math.isnan(value) else ("∞" if value > 0 else "−∞")
-    return f"{value:.{digits}g}".replace("-", "−", 1 if value < 0 else 0)
+    # Rounded first and then written out, so that 13200 is not 1.32e+04.
+    return f"{float(f'{value:.{digits}g}'):g}".replace("-", "−", 1 if value < 0 else 0)
 
 
 def per_cent(share: float) -> str:
@@ -46,8 +51,10 @@ def per_cent(share: float) -> str:
     if not math.isfinite(share):
         return "–"
     number = 100.0 * share
+    if 0.0 < abs(number) < 1e-4:
+        return f"{number:.0e} %".replace("-", "−")
     digits = 0 if abs(number) >= 9.95 or number == 0.0 else 1 - math.floor(math.log10(abs(number)))
-    return f"{number:.{min(max(digits, 0), 6)}f} %"
+    return f"{number:.{max(digits, 0)}f} %"
 
 
 def plain(value: object) -> object:

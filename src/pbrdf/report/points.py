@@ -67,12 +67,15 @@ class Points:
         bare = cls.from_dataset(report.dataset)
         nothing = np.full(bare.theta_i.shape, np.nan)
 
+        # Noise that the fit had to assume is no uncertainty of the measurement: no bars are drawn of it.
+        stated = report.result.std_known or report.settings.get("noise") is not None
+
         def column(name: str) -> np.ndarray:
-            return comparison[name].values if name in comparison else nothing
+            known = name in comparison and (stated or not name.endswith("_std"))
+            return comparison[name].values if known else nothing
 
         dolp = None
         if bare.dolp is not None:
-            # a fit with assumed noise knows no uncertainty of the measurement, but what it assumed is drawn
             std = column("dolp_std")
             if "dolp_std" not in comparison and "I_std" in comparison:
                 q, u = ("Q", "U") if "Q_std" in comparison else ("m10", "m20")
@@ -129,11 +132,16 @@ class Points:
 
 
 def dolp_uncertainty(
-    I: np.ndarray, Q: np.ndarray, U: np.ndarray, s_I: np.ndarray, s_Q: np.ndarray, s_U: np.ndarray
+    I: np.ndarray,  # noqa: E741
+    Q: np.ndarray,
+    U: np.ndarray,
+    s_I: np.ndarray,
+    s_Q: np.ndarray,
+    s_U: np.ndarray,
 ) -> np.ndarray:
     """Standard uncertainty of √(Q² + U²)/I from independent ones, to first order.
 
-    U may be NaN throughout (not measured). Where Q = U = 0, where the first order fails, that of Q/I is given.
+    U may be NaN throughout (not measured). Where Q = U = 0, where the first order fails, it is that of Q/I.
     """
     U, s_U = np.nan_to_num(U), np.nan_to_num(s_U)
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from pbrdf.data.storage import atomic_target
 from pbrdf.errors import DataError
@@ -13,15 +15,28 @@ from pbrdf.errors import DataError
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["BLUE", "GREY", "MARKERS", "RED", "colours", "new_figure", "save_figure", "styled"]
+__all__ = [
+    "BLUE",
+    "DISTINCT_COLOURS",
+    "GREY",
+    "RED",
+    "Look",
+    "looks_of",
+    "new_figure",
+    "panels",
+    "save_figure",
+    "styled",
+]
 
 #: Okabe and Ito's colours that show on white; their yellow does not.
 _OKABE_ITO = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 BLUE, RED, GREY = _OKABE_ITO[0], _OKABE_ITO[1], "#777777"
+#: Up to so many curves have a colour that has a name.
+DISTINCT_COLOURS = len(_OKABE_ITO)
 #: So that the groups are told apart in black and white too.
-MARKERS = "os^Dv<>pPX"
+_MARKERS = "os^Dv<>pPX"
 
-_RC = {
+_RC: dict[str, Any] = {
     "font.size": 10.0,
     "axes.titlesize": 11.0,
     "axes.labelsize": 10.0,
@@ -45,12 +60,14 @@ def styled() -> Iterator[None]:
     """Matplotlib with the project's settings while a figure is built or saved, whatever the user's are."""
     import matplotlib
 
-    with matplotlib.rc_context({**matplotlib.rcParamsDefault, **_RC, "backend": "agg"}):
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()
+        matplotlib.rcParams.update(_RC)  # type: ignore[arg-type]
         yield
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """A figure of this size in inches that belongs to no window and needs no display."""
+    """A figure of this size in inches, laid out by matplotlib, that belongs to no window."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -59,16 +76,79 @@ def new_figure(width: float, height: float) -> Figure:
     return figure
 
 
-def colours(count: int) -> list[str]:
-    """Colours for so many curves: distinct ones for a few, an ordered ramp for many."""
-    if count <= len(_OKABE_ITO):
-        return list(_OKABE_ITO[:count])
-    from matplotlib import colormaps
-    from matplotlib.colors import to_hex
+def panels(
+    rows: int, columns: int, size: tuple[float, float], title: str, handles: list[Any]
+) -> tuple[Figure, Any]:
+    """A figure with a grid of axes, a title above and a legend below.
 
-    # ordered in lightness as well; its bright end would be lost on white
-    ramp = colormaps["viridis"]
-    return [to_hex(ramp(0.92 * i / (count - 1))) for i in range(count)]
+    Everything has its place in inches: to let matplotlib find the places takes longer than to draw.
+
+    Parameters
+    ----------
+    rows, columns
+        Of the grid.
+    size
+        Width and height of the axes, inches.
+    title
+        Above all.
+    handles
+        Entries of the legend.
+
+    Returns
+    -------
+    figure, axes
+        The axes have the shape (rows, columns).
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    left, right, top, bottom, between, above = 0.8, 0.2, 0.8, 0.6, 0.95, 0.75
+    width = left + columns * size[0] + (columns - 1) * between + right
+    longest = max(len(handle.get_label()) for handle in handles)
+    across = min(max(int(width / (0.075 * longest + 0.6)), 1), len(handles))
+    legend = 0.24 * math.ceil(len(handles) / across) + 0.1
+    height = bottom + legend + rows * size[1] + (rows - 1) * above + top
+    figure = Figure(figsize=(width, height))
+    FigureCanvasAgg(figure)
+    axes = figure.subplots(
+        rows,
+        columns,
+        squeeze=False,
+        gridspec_kw={
+            "left": left / width,
+            "right": 1.0 - right / width,
+            "bottom": (bottom + legend) / height,
+            "top": 1.0 - top / height,
+            "wspace": between / size[0],
+            "hspace": above / size[1],
+        },
+    )
+    figure.suptitle(title, y=1.0 - 0.15 / height, verticalalignment="top")
+    figure.legend(
+        handles=handles, loc="lower center", ncols=across, frameon=False, bbox_to_anchor=(0.5, 0.02 / height)
+    )
+    return figure, axes
+
+
+@dataclass(frozen=True)
+class Look:
+    """Colour and marker of what belongs together."""
+
+    colour: str
+    marker: str
+
+
+def looks_of(count: int) -> list[Look]:
+    """Looks of so many curves: colours with names for a few, an ordered ramp for many."""
+    colours: tuple[str, ...] = _OKABE_ITO
+    if count > DISTINCT_COLOURS:
+        from matplotlib import colormaps
+        from matplotlib.colors import to_hex
+
+        # ordered in lightness as well; its bright end would be lost on white
+        ramp = colormaps["viridis"]
+        colours = tuple(to_hex(ramp(0.92 * i / (count - 1))) for i in range(count))
+    return [Look(colours[i], _MARKERS[i % len(_MARKERS)]) for i in range(count)]
 
 
 def save_figure(figure: Figure, path: Path) -> None:
@@ -80,8 +160,13 @@ def save_figure(figure: Figure, path: Path) -> None:
         If the format is not known or the file cannot be written.
     """
     kind = path.suffix.lower().removeprefix(".")
-    undated: dict[str, dict[str, None]] = {"png": {}, "pdf": {"CreationDate": None}, "svg": {"Date": None}}
-    if kind not in undated:
-        raise DataError(f"{path}: figures are written as {', '.join('.' + k for k in undated)}")
+    # No dates, so that the same figure is the same file; PNG little compressed, as that takes half as long.
+    options: dict[str, dict[str, Any]] = {
+        "png": {"dpi": _DOTS_PER_INCH, "pil_kwargs": {"compress_level": 1}},
+        "pdf": {"metadata": {"CreationDate": None}},
+        "svg": {"metadata": {"Date": None}},
+    }
+    if kind not in options:
+        raise DataError(f"{path}: figures are written as {', '.join('.' + k for k in options)}")
     with styled(), atomic_target(path) as target:
-        figure.savefig(target, format=kind, dpi=_DOTS_PER_INCH, metadata=undated[kind])
+        figure.savefig(target, format=kind, **options[kind])

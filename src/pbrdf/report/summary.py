@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import io
 import math
-from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from pbrdf.inversion.fit import NEAR_SPECULAR, Estimate, FitResult
-from pbrdf.report.describe import cautions, illumination_in_words, wavelengths_in_words
+from pbrdf.report.describe import cautions, illumination_in_words, shown_unit, wavelengths_in_words
 from pbrdf.report.numbers import brief, per_cent, with_error
 from pbrdf.report.subject import Report
 
@@ -33,8 +33,17 @@ STRONG = 0.9
 _POOR = 0.3
 #: Deviation of χ² from its expectation, in standard deviations, that is called a coincidence.
 _COINCIDENCE = 3.0
+#: Reduced χ² of data without noise, simulated with the model itself.
+_EXACT = 1e-12
 #: Root mean square of measured values, in standard uncertainties, up to which they are noise.
 _NO_SIGNAL = 1.5
+
+#: Ratio of the rms to the median of relative errors from which on a few geometries make up the rms.
+_DARK_DOMINATES = 10.0
+#: Relative rms from which on that is worth a remark.
+_LARGE = 0.5
+#: Width of the console below which the meaning of the parameters is left out.
+_NARROW = 100
 
 _TEXT_WIDTH = 110
 
@@ -62,15 +71,17 @@ def print_summary(report: Report, console: Console, *, verbose: bool = False) ->
     verbose
         Also the full correlation matrix.
     """
-    for part in _parts(report, verbose):
+    for part in _parts(report, verbose, wide=console.width >= _NARROW):
         console.print(part)
 
 
-def _parts(report: Report, verbose: bool) -> Iterator[RenderableType]:
+def _parts(report: Report, verbose: bool, wide: bool) -> Iterator[RenderableType]:
+    from rich.text import Text
+
     result = report.result
     yield _headed(_heading(report))
     yield ""
-    yield _parameter_table(result)
+    yield _parameter_table(result, wide)
     yield ""
     sections = [
         ("Correlation", correlation_in_words(result)),
@@ -83,6 +94,7 @@ def _parts(report: Report, verbose: bool) -> Iterator[RenderableType]:
         yield _correlation_table(result)
     yield ""
     yield _error_table(result)
+    yield Text("; ".join(_remarks_on_errors(result)), style="italic")
     notes = [*result.notes, *cautions(report.dataset)]
     if notes:
         yield ""
@@ -98,18 +110,28 @@ def _heading(report: Report) -> list[tuple[str, list[str]]]:
     title = ds.attrs.get("title")
     count = f"{total - held} of {total} geometries" if held else f"{total} geometries"
     data = (
-        f"{count}, {result.goodness.data} measured values of {_channels(result)}; {wavelengths_in_words(ds)}, "
-        f"{illumination_in_words(ds)}"
+        f"{count}, {result.goodness.data} measured values of {_channels(result)}; "
+        f"{wavelengths_in_words(ds)}, {illumination_in_words(ds)}"
     )
     rows = [
-        ("Fitted", [report.name + (f" ({title})" if title else "")]),
+        ("Fitted to", [report.name + (f" ({title})" if title else "")]),
         ("Model", [", ".join([model.name, *options])]),
         ("Data", [data + ("; simulated, not measured" if ds.attrs.get("simulated") else "")]),
         ("Noise", [result.noise]),
     ]
+    if reading := report.settings.get("reading"):
+        rows.insert(1, ("Read with", [", ".join(_options_in_words(reading))]))
+    if len(result.stages) > 1:
+        rows.append(("Steps", [", then ".join(f"{s.name} ({s.points} geometries)" for s in result.stages)]))
     if result.hold_out is not None:
         rows.append(("Held out", [f"{result.hold_out}: {held} geometries, predicted below"]))
     return rows
+
+
+def _options_in_words(options: Mapping[str, Any]) -> Iterator[str]:
+    for name, value in options.items():
+        for one in value if isinstance(value, list) else [value]:
+            yield name.replace("_", " ") + ("" if one is True else f" {one}")
 
 
 def _channels(result: FitResult) -> str:
@@ -133,24 +155,32 @@ def _headed(rows: list[tuple[str, list[str]]]) -> Table:
     return table
 
 
-def _parameter_table(result: FitResult) -> Table:
+def _parameter_table(result: FitResult, wide: bool) -> Table:
     from rich.table import Table
     from rich.text import Text
 
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
-    table.add_column("parameter")
-    table.add_column("meaning", overflow="fold")
+    table.add_column("parameter", no_wrap=True)
+    if wide:
+        table.add_column("meaning", overflow="fold", min_width=24)
     table.add_column("value ± standard error", no_wrap=True)
     table.add_column("unit")
     table.add_column("bounds", no_wrap=True)
     table.add_column("verdict", overflow="fold")
     for e in result.estimates.values():
         p = e.parameter
+        factor, unit = shown_unit(p)
         label = p.name if p.symbol == p.name else f"{p.symbol} ({p.name})"
-        limits = "" if e.verdict == "fixed" else f"{brief(e.lower)} … {brief(e.upper)}"
+        limits = (
+            "" if e.verdict == "fixed" else f"{brief(factor * e.lower, 3)} … {brief(factor * e.upper, 3)}"
+        )
+        meaning = [p.description.partition(",")[0]] if wide else []
         style = {"determined": "green", "fixed": "dim"}.get(e.verdict, "yellow")
-        value = f"({brief(e.value, 3)})" if e.verdict == "undetermined" else with_error(e.value, e.std)
-        table.add_row(label, p.description, value, p.unit, limits, Text(verdict_in_words(e), style=style))
+        value = with_error(factor * e.value, factor * e.std)
+        if e.verdict == "undetermined":
+            value = f"({brief(factor * e.value, 3)})"
+        verdict = Text(verdict_in_words(e), style=style)
+        table.add_row(label, *meaning, value, unit, limits, verdict)
     return table
 
 
@@ -165,7 +195,8 @@ def verdict_in_words(estimate: Estimate) -> str:
     share = estimate.std / abs(estimate.value) if estimate.value else math.inf
     # A parameter that may have either sign is not known "to 300 %" when it is near 0.
     if estimate.lower < 0.0 < estimate.upper:
-        return f"determined to ±{brief(estimate.std, 2)}"
+        factor, unit = shown_unit(estimate.parameter)
+        return f"determined to ±{brief(factor * estimate.std, 2)}{unit if unit == '°' else ''}"
     return f"{'poorly determined, to' if share > _POOR else 'determined to'} {per_cent(share)}"
 
 
@@ -204,26 +235,26 @@ def goodness_in_words(result: FitResult) -> list[str]:
     if without_signal:
         lines.append(f"within their noise of 0, so without an R²: {', '.join(without_signal)}")
     lines.append(
-        f"AIC {brief(g.aic, 5)}, BIC {brief(g.bic, 5)} (lower is better among models of the same data and noise)"
+        f"AIC {brief(g.aic, 5)}, BIC {brief(g.bic, 5)} (lower is better, among models of the same data)"
     )
     return lines
 
 
 def _chi2_verdict(result: FitResult) -> str:
     reduced = result.goodness.reduced_chi2
+    residuals = f"the residuals are {brief(math.sqrt(reduced), 2)} times"
+    if reduced < _EXACT:
+        return "the model reproduces the data exactly"
     if not result.std_known:
         return (
-            "relative only, as the noise is assumed or stated and not part of the data; the residuals are "
-            f"{brief(math.sqrt(reduced), 2)} times that noise, and the standard errors are scaled by it"
+            f"relative only, as the data state no uncertainty; {residuals} the noise named above, and the "
+            "standard errors are scaled by that"
         )
     tolerance = _COINCIDENCE * math.sqrt(2.0 / (result.goodness.data - result.goodness.free))
     if reduced > 1.0 + tolerance:
-        return (
-            f"the residuals are {brief(math.sqrt(reduced), 2)} times the stated noise: the model misses something, or "
-            "the noise is understated"
-        )
+        return f"{residuals} the stated noise: the model misses something, or the noise is understated"
     if reduced < 1.0 - tolerance:
-        return f"the residuals are {brief(math.sqrt(reduced), 2)} times the stated noise: the noise is overstated"
+        return f"{residuals} the stated noise: the noise is overstated"
     return "consistent with the stated noise"
 
 
@@ -261,7 +292,9 @@ def optima_in_words(result: FitResult) -> list[str]:
             else f"χ² higher by {brief(second.chi2 - best.chi2, 2)}"
         )
         values = ", ".join(f"{name} {brief(value, 3)}" for name, value in second.values.items())
-        lines.append(f"the next best has {worse} ({second.count} starts): {values}")
+        lines.append(
+            f"the next best has {worse} ({second.count} start{'s' if second.count > 1 else ''}): {values}"
+        )
     else:
         lines.append("no other optimum was found")
     if result.converged < result.starts:
@@ -288,21 +321,31 @@ def _error_table(result: FitResult) -> Table:
 
     polarised = any(math.isfinite(p.dolp_rms) for p in (*result.fitted.values(), *result.predicted.values()))
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
-    table.add_column("errors, model − measured")
-    table.add_column("geometries", justify="right")
-    heads = ["intensity rms", "median", "largest", *(["DoLP rms", "largest"] if polarised else [])]
+    table.add_column("errors,\nmodel − measured", no_wrap=True)
+    table.add_column("\nnumber", justify="right")
+    heads = ["intensity\nmedian", "\nrms", "\nlargest", *(["DoLP\nrms", "\nlargest"] if polarised else [])]
     for head in heads:
         table.add_column(head, justify="right")
     for what, regions in (("fitted", result.fitted), ("predicted", result.predicted)):
         for region, p in regions.items():
-            cells = [per_cent(p.intensity_rms), per_cent(p.intensity_median), per_cent(p.intensity_max)]
+            cells = [per_cent(p.intensity_median), per_cent(p.intensity_rms), per_cent(p.intensity_max)]
             if polarised:
-                cells += [brief(p.dolp_rms, 2), brief(p.dolp_max, 2)]
+                cells += [_dolp(p.dolp_rms), _dolp(p.dolp_max)]
             style = "bold" if what == "predicted" else None
             table.add_row(f"{what}, {region}", str(p.count), *cells, style=style)
-    tilt = math.degrees(math.atan(NEAR_SPECULAR * float(result.model.values["sigma"])))
-    table.caption = (
-        f"near-specular: the mirroring facet is tilted by less than {NEAR_SPECULAR:g} σ = {brief(tilt, 2)}°"
-    )
-    table.caption_justify = "left"
     return table
+
+
+def _dolp(error: float) -> str:
+    return f"{error:.4f}" if error >= 1e-4 else brief(error, 2)
+
+
+def _remarks_on_errors(result: FitResult) -> list[str]:
+    tilt = math.degrees(math.atan(NEAR_SPECULAR * float(result.model.values["sigma"])))
+    remarks = [
+        f"near-specular: the mirroring facet is tilted by less than {NEAR_SPECULAR:g} σ = {brief(tilt, 2)}°"
+    ]
+    errors = [*result.fitted.values(), *result.predicted.values()]
+    if any(p.intensity_rms > max(_DARK_DOMINATES * p.intensity_median, _LARGE) for p in errors):
+        remarks.append("a few dark geometries rule the relative rms: trust the median")
+    return remarks

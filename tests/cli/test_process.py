@@ -1,0 +1,87 @@
+"""What only a process of its own shows: imports, exit codes, streams, environment."""
+
+import importlib.metadata
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import pbrdf
+
+COMMAND = "from pbrdf.cli.main import main; main()"
+HEAVY = {"matplotlib", "scipy", "xarray", "drjit", "dask", "pandas", "h5py", "mitsuba", "rich.progress"}
+
+
+def process(*arguments, cwd: Path, **environment: str) -> subprocess.CompletedProcess:
+    """Run the command in a process of its own."""
+    return subprocess.run(
+        [sys.executable, "-c", COMMAND, *map(str, arguments)],
+        cwd=cwd,
+        env={**os.environ, **environment},
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "import pbrdf",
+        "import pbrdf.cli.main",
+        "import pbrdf.cli.main as m; m.app(['--help'], standalone_mode=False)",
+        "import pbrdf.cli.main as m; m.app(['fit', '--help'], standalone_mode=False)",
+    ],
+)
+def test_help_and_import_load_nothing_heavy(code):
+    code += f"; import sys; sys.stderr.write(' '.join(sorted({HEAVY!r} & set(sys.modules))))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0
+    assert done.stderr == ""
+
+
+def test_the_entry_point_is_main():
+    (entry,) = importlib.metadata.entry_points(group="console_scripts", name="pbrdf")
+    from pbrdf.cli.main import main
+
+    assert entry.load() is main
+
+
+def test_version(tmp_path):
+    assert process("--version", cwd=tmp_path).stdout == f"pbrdf {pbrdf.__version__}\n"
+
+
+def test_a_mistake_is_one_line_and_code_2(tmp_path):
+    done = process("check", "nothing.csv", cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == "pbrdf: error: nothing.csv: there is no such file\n"
+
+
+def test_without_llvm_the_doctor_says_what_to_install(tmp_path):
+    done = process("doctor", cwd=tmp_path, DRJIT_LIBLLVM_PATH="/nonexistent", PBRDF_BACKEND="llvm")
+    assert done.returncode == 1
+    assert "pip install karellen-llvm-core" in done.stderr
+    assert "Dr.Jit" in done.stdout
+    assert "Traceback" not in done.stderr
+
+
+def test_without_llvm_a_fit_says_what_to_install(tmp_path):
+    done = process("fit", "white", cwd=tmp_path, DRJIT_LIBLLVM_PATH="/nonexistent", PBRDF_BACKEND="llvm")
+    assert done.returncode == 2
+    assert "pip install karellen-llvm-core" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_unknown_backend_in_the_environment_is_named(tmp_path):
+    done = process("doctor", cwd=tmp_path, PBRDF_BACKEND="opencl")
+    assert done.returncode == 1
+    assert "PBRDF_BACKEND" in done.stderr
+
+
+def test_output_that_an_old_code_page_lacks_is_replaced(tmp_path):
+    done = process("paints", cwd=tmp_path, PYTHONIOENCODING="ascii")
+    assert done.returncode == 0
+    assert "pearl-white" in done.stdout
