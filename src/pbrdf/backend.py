@@ -77,7 +77,6 @@ class Backend:
     def Bool(self) -> Any:
         return self.module.Bool
 
-
     def upload(self, array_type: Any, values: Any) -> Any:
         """Copy a NumPy array into memory of Dr.Jit's own.
 

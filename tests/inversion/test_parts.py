@@ -31,7 +31,7 @@ def test_noise_is_relative_in_the_bright_and_absolute_in_the_dark():
 
 def test_noise_is_read_as_numbers_or_percentages():
     assert NoiseModel.parse("2%,0.1%") == NoiseModel(0.02, 0.001)
-    assert NoiseModel.parse("0.05") == NoiseModel(0.05)
+    assert NoiseModel.parse("0.02") == NoiseModel(0.02, 0.02)
     with pytest.raises(FitError, match=r"relative part is -1\.0"):
         NoiseModel.parse("-1")
 
@@ -43,6 +43,22 @@ def test_starts_fill_the_box_and_keep_off_its_walls(count, size, seed):
     assert points.shape == (count, size)
     share = (points - lower) / (upper - lower)
     assert (share >= 0.05).all() and (share <= 0.95).all()
+
+
+@pytest.mark.parametrize("size", [1, 2, 7, 21])
+def test_the_sobol_sequence_is_scipys(size):
+    from scipy.stats import qmc
+
+    from pbrdf.inversion.starts import _sobol_integers
+
+    np.testing.assert_array_equal(
+        _sobol_integers(size, 256) / 2**30, qmc.Sobol(size, scramble=False).random_base2(8)
+    )
+
+
+def test_more_dimensions_than_the_table_has_are_scipys():
+    points = sobol_starts(np.zeros(30), np.ones(30), 16, 3)
+    assert points.shape == (16, 30) and (points >= 0.05).all() and (points <= 0.95).all()
 
 
 def test_starts_are_space_filling_and_repeatable():

@@ -187,7 +187,9 @@ def test_contours_are_the_joint_ellipses_of_two_parameters(monkeypatch, measured
     grid = np.stack(np.meshgrid(found.grid["x"], found.grid["z"], indexing="ij"), axis=-1)
     away = grid - result.unknowns[[0, 2]]
     expected = np.einsum("abi,ij,abj->ab", away, np.linalg.inv(cov), away)
-    np.testing.assert_allclose(found.grid["chi2_rise"], expected, rtol=1e-6, atol=1e-8)
+    near = expected < 2.0 * 5.9915
+    np.testing.assert_allclose(found.grid["chi2_rise"].values[near], expected[near], rtol=1e-6, atol=1e-8)
+    assert (expected[np.isnan(found.grid["chi2_rise"])] > 2.0 * 5.9915).all()
     # the grid holds the whole 95 % region, which on each axis is √(5.99/3.84) as wide as a single interval
     for name, variance in zip(("x", "z"), np.diag(cov), strict=True):
         span = np.ptp(found.grid[name].values)
@@ -274,6 +276,35 @@ def test_contour_on_the_model_touches_its_profile_intervals(small_fit):
     near = curve["chi2_rise"].values < 4.0
     np.testing.assert_allclose(shadow[near], curve["chi2_rise"].values[near], atol=0.15)
     assert found.notes == []
+
+
+def test_intervals_follow_a_bent_valley(monkeypatch, measured):
+    """y = x² − x with a weak pull of x to 0: y has two branches, and the optimum's own is not the lower one.
+
+    From the optimum at 0 the Jacobian leads y > 0 along x < 0; the curve must be the minimum over all x.
+    """
+    result = linear_fit(monkeypatch, design()[:, :2], measured)
+
+    def function(u, lane, point):
+        return [10.0 * (u[1] - u[0] * u[0] + u[0]), (u[0] - 0.2) / 2.0], None
+
+    monkeypatch.setattr(module, "residuals", lambda space, data, starts=1: Residuals(function, 1))
+    result.unknowns = np.array([0.2, -0.16])
+    J = np.array([[6.0, 10.0], [0.5, 0.0]])
+    result.information = J.T @ J
+    found = profile(result, ["y"], points=41)
+    x = np.linspace(-8.0, 8.0, 400_001)
+
+    def rise(y):
+        return ((10.0 * (y - x * x + x)) ** 2 + (x - 0.2) ** 2 / 4.0).min()
+
+    curve = found.curves.sel(parameter="y")
+    expected = [rise(y) for y in curve["value"].values]
+    np.testing.assert_allclose(curve["chi2_rise"], expected, atol=2e-3)
+    interval = found.intervals["y"]
+    # the branch x > 0 would end at y = 13.1, the other reaches 17
+    np.testing.assert_allclose([rise(interval.lower), rise(interval.upper)], 3.8415, atol=0.02)
+    assert interval.upper > 16.0
 
 
 @pytest.mark.parametrize(

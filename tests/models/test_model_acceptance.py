@@ -199,7 +199,6 @@ def test_default_accuracy_of_visible_for_all_k():
     assert error.max() <= 1e-4
 
 
-
 @given(arrays(float, (7, 64), elements=st.floats(0.0, 1.0)))
 @pytest.mark.parametrize("shadowing", ["v-cavity", "smith", "none"])
 def test_specular_part_against_the_printed_equations(shadowing, unit):

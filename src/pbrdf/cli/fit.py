@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -60,7 +61,8 @@ def fit(
     noise: Annotated[
         str | None,
         typer.Option(
-            help="Noise relative to the intensity, and absolute in units of its median, e.g. 0.02,0.001.",
+            help="Noise relative to the intensity, and absolute in units of its median, e.g. 0.02,0.01; or "
+            "equal; or instrument:linear=1%,circular=5%,read=0.5,quantum=1.",
             metavar="REL[,ABS]",
             show_default="the uncertainties in the data, else an assumption that is printed",
         ),
@@ -72,6 +74,44 @@ def fit(
             metavar="KIND=VALUES",
         ),
     ] = None,
+    strategy: Annotated[
+        str, typer.Option(help="joint, or stepwise: diffuse parameters first, then specular, then all.")
+    ] = "joint",
+    polish: Annotated[
+        bool, typer.Option("--polish/--no-polish", help="End the stepwise strategy with a joint fit.")
+    ] = True,
+    diffuse_tilt: Annotated[
+        float | None,
+        typer.Option(
+            help="Stepwise: facet tilt in degrees beyond which data count as diffuse.",
+            show_default="4.5 sigma, revised as sigma is found",
+        ),
+    ] = None,
+    nuisance: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="What the instrument adds: gain, dark, angle or source (degrees), e.g. gain:group or "
+            "angle:group~0,0.1 (repeatable).",
+            metavar="KIND[:group][~MEAN,STD]",
+        ),
+    ] = None,
+    prior: Annotated[
+        list[str] | None,
+        typer.Option(help="Gaussian prior, e.g. n=1.55,0.05 (repeatable).", metavar="NAME=MEAN,STD"),
+    ] = None,
+    split: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="A parameter of its own for each group or wavelength, e.g. a=wavelength (repeatable).",
+            metavar="NAME=group|wavelength",
+        ),
+    ] = None,
+    objective: Annotated[
+        str, typer.Option(help="stokes (signed components), or paper: intensity and DoLP, equal weights.")
+    ] = "stokes",
+    loss: Annotated[
+        str, typer.Option(help="linear, or against outliers soft_l1, huber or cauchy.")
+    ] = "linear",
     seed: Annotated[int, typer.Option(help="Seed of the starts and of a held-out fraction.", min=0)] = 0,
     output: Annotated[
         Path | None,
@@ -114,6 +154,16 @@ def fit(
         "starts": starts,
         "noise": noise,
         "hold_out": hold_out,
+        "strategy": strategy,
+        "polish": polish,
+        "diffuse_tilt": None if diffuse_tilt is None else math.radians(diffuse_tilt),
+        "nuisances": list(nuisance or ()),
+        "priors": {
+            name: _prior(name, text) for name, text in pairs(prior or (), "--prior", "n=1.55,0.05").items()
+        },
+        "split": pairs(split or (), "--split", "a=wavelength"),
+        "objective": objective,
+        "loss": loss,
         "seed": seed,
     }
     folders = _folders(files, output)
@@ -145,6 +195,13 @@ def fit(
         console = output_console()
         print_summary(report, console, verbose=verbose)
         console.print(f"\nWritten to {folder}/: {', '.join(path.name for path in written)}", markup=False)
+
+
+def _prior(name: str, text: str) -> tuple[float, float]:
+    """Mean and standard deviation of a prior."""
+    from pbrdf.inversion.nuisance import parse_prior
+
+    return parse_prior(f"--prior {name}", text)
 
 
 def _folders(files: list[str], output: Path | None) -> list[Path]:

@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pbrdf.backend import get_backend
 from pbrdf.errors import FitError
 from pbrdf.inversion.observations import Observations
-from pbrdf.inversion.problem import Space, residuals
+from pbrdf.inversion.problem import predict, residuals
 from pbrdf.inversion.solver import Status, solve
 
 if TYPE_CHECKING:
@@ -20,7 +19,7 @@ if TYPE_CHECKING:
 
     from pbrdf.inversion.fit import FitResult
 
-__all__ = ["Bootstrap", "bootstrap", "modelled", "simulate"]
+__all__ = ["Bootstrap", "bootstrap", "simulate"]
 
 
 @dataclass(frozen=True)
@@ -104,7 +103,9 @@ def bootstrap(
         raise FitError(f"level={level:g}: a share lies between 0 and 1, for example 0.95")
     space, data = result.space, result.data
     scale = 1.0 if result.std_known else math.sqrt(result.goodness.reduced_chi2)
-    sets = simulate(data, modelled(space, data, result.unknowns), count, np.random.default_rng(seed), scale)
+    modelled = predict(space, result.unknowns, data, data.channels)
+    truth = np.stack([modelled[name] for name in data.channels])
+    sets = simulate(data, truth, count, np.random.default_rng(seed), scale)
     low, high = space.to_unknowns(space.lower), space.to_unknowns(space.upper)
     start = np.tile(result.unknowns, (count, 1))
     solution = solve(residuals(space, sets, 1), start, low, high, progress=progress)
@@ -129,6 +130,11 @@ def bootstrap(
     notes = []
     if failed:
         notes.append(f"{failed} of {count} fits of simulated data did not converge and are left out.")
+    if any(term.prior is not None for term in space.terms):
+        notes.append(
+            "Priors are the same for every simulated data set: parameters that rest on one scatter less than their "
+            "standard error says."
+        )
     often = [f"{name} ({share:.0%})" for name, share in zip(names, at_bound, strict=True) if share >= 0.05]
     if often:
         notes.append(
@@ -152,36 +158,6 @@ def bootstrap(
         failed=failed,
         notes=notes,
     )
-
-
-def modelled(space: Space, data: Observations, unknowns: np.ndarray) -> np.ndarray:
-    """What the model gives for the channels of observations, with everything that the fit's residuals contain.
-
-    Parameters
-    ----------
-    space
-        Free and fixed parameters.
-    data
-        Geometries and channels.
-    unknowns
-        The solver's unknowns, shape (P,).
-
-    Returns
-    -------
-    ndarray
-        Shape (C, G), on the scale of the observations' values.
-    """
-    import drjit as dr
-
-    backend = get_backend()
-    # measured values of 0 with unit uncertainty: the residuals are then the modelled values
-    blank = replace(data, values=np.zeros_like(data.values), std=np.ones_like(data.std))
-    problem = residuals(space, [blank], 1)
-    channels, count = data.values.shape
-    u = [dr.opaque(backend.Float, float(value)) for value in unknowns]
-    with dr.suspend_grad():
-        weighted, _ = problem.function(u, dr.zeros(backend.UInt32, count), dr.arange(backend.UInt32, count))
-    return np.stack([np.broadcast_to(value.numpy(), count) for value in list(weighted)[:channels]])
 
 
 def simulate(

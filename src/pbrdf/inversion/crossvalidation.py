@@ -1,8 +1,8 @@
 """Cross-validation: every measured point predicted by a fit that has not seen it.
 
 The data are divided into folds. For each fold the model is fitted to the others and predicts it. A fold is the
-whole data set with the fold's points given no weight, so that all folds have one form and are solved, from all
-starts, in a single batch.
+whole data set with the fold's points given no weight, so that all folds have one form and are searched, from all
+starts, in a single batch; the best end of each fold is then refined.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ __all__ = ["SCHEMES", "CrossValidation", "Fold", "cross_validate"]
 SCHEMES = ("group", "theta_i", "angle", "fraction")
 #: Number of folds by angle or fraction, if the user states none.
 DEFAULT_FOLDS = 5
-#: Starts whose χ² exceeds the best by at most this share reached the same optimum.
-SAME_OPTIMUM = 1e-6
+#: Starts whose χ² after the search exceeds the best by at most this share reached the same optimum.
+SAME_OPTIMUM = 1e-3
 
 
 @dataclass(frozen=True)
@@ -147,8 +147,9 @@ def cross_validate(
 ) -> CrossValidation:
     """Predict every part of a data set from the rest.
 
-    One fit to all data states the problem (free parameters, bounds, weights); then all folds are fitted in one
-    batch, each from ``starts`` − 1 starts of their own and from the optimum of all data.
+    One fit to all data states the problem (free parameters, bounds, weights); then all folds are searched in one
+    batch, each from the optimum of all data and from the first ``starts`` − 1 starts of that fit. Whatever the
+    strategy of that fit, the folds are fitted jointly.
 
     Parameters
     ----------
@@ -203,28 +204,42 @@ def cross_validate(
                 f"without {label} {masked.count} measured values are left, too few for {len(full.space.free)} "
                 "parameters: make more folds, or fix parameters"
             )
-    solution = _solve(full, data, starts, max_iterations, progress)
-    return _summarise(dataset, by, full, held, labels, number, solution, starts)
+    solution, reached = _search(full, data, starts, max_iterations, progress)
+    for label, cost in zip(labels, solution.cost, strict=True):
+        if not math.isfinite(cost):
+            raise FitError(f"without {label} no start gave finite residuals: check the data and the bounds")
+    return _summarise(dataset, by, full, held, labels, number, solution, reached, starts)
 
 
-def _solve(
+def _search(
     full: FitResult,
     data: list[Observations],
     starts: int,
     max_iterations: int,
     progress: Callable[[int, int], None] | None,
-) -> Solution:
-    """All folds from all starts in one batch; lane l is start l % starts of fold l // starts."""
+) -> tuple[Solution, np.ndarray]:
+    """Best solution of each fold, and how many starts reached it, shape (K,).
+
+    All folds are searched from all starts in one batch with the draft accuracy: lane l is start l % starts of
+    fold l // starts. The best end of each is refined with the model's own accuracy.
+    """
     space = full.space
+    low, high = space.to_unknowns(space.lower), space.to_unknowns(space.upper)
     begin = np.concatenate([full.unknowns[None], space.to_unknowns(full.start_values)])[:starts]
-    return solve(
-        residuals(space, data, starts),
+    search = solve(
+        residuals(space, data, starts, accuracy="draft"),
         np.tile(begin, (len(data), 1)),
-        space.to_unknowns(space.lower),
-        space.to_unknowns(space.upper),
+        low,
+        high,
         max_iterations=max_iterations,
+        tolerance=1e-6,
         progress=progress,
     )
+    cost = np.where(np.isfinite(search.cost), search.cost, np.inf).reshape(len(data), starts)
+    reached = (cost <= cost.min(axis=1, keepdims=True) * (1.0 + SAME_OPTIMUM)).sum(axis=1)
+    best = np.arange(len(data)) * starts + cost.argmin(axis=1)
+    refined = solve(residuals(space, data), search.u[best], low, high, max_iterations=max_iterations)
+    return refined, reached
 
 
 def _with_labels_filled(
@@ -235,16 +250,11 @@ def _with_labels_filled(
     Nothing in the fold speaks for them; a fit that holds such a group out predicts it in the same way.
     """
     filled = unknowns.copy()
-    missing = np.zeros(len(unknowns), dtype=bool)
+    missing = [t.split is not None and held[getattr(data, t.split) == t.label].all() for t in space.terms]
     for i, term in enumerate(space.terms):
-        if term.split is not None:
-            missing[i] = held[getattr(data, term.split) == term.label].all()
-    for i in np.flatnonzero(missing):
-        same = [
-            j for j, term in enumerate(space.terms) if term.role == space.terms[i].role and not missing[j]
-        ]
-        if same:
-            filled[i] = unknowns[same].mean()
+        others = [j for j, o in enumerate(space.terms) if o.role == term.role and not missing[j]]
+        if missing[i] and others:
+            filled[i] = unknowns[others].mean()
     return filled
 
 
@@ -274,9 +284,14 @@ def _divide(dataset: xr.Dataset, by: str, folds: int | None, seed: int) -> tuple
         raise FitError(f"folds={count}: the data set has only {len(distinct)} values of {noun}")
     number = (np.arange(len(distinct)) % count)[member]
     labels = [
-        f"{noun} {', '.join(f'{value}{unit}' for value in distinct[k::count].tolist())}" for k in range(count)
+        f"{noun} {', '.join(_shown(value) + unit for value in distinct[k::count].tolist())}"
+        for k in range(count)
     ]
     return number, labels
+
+
+def _shown(value: Any) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def _parts(size: int, folds: int, seed: int) -> tuple[np.ndarray, list[str]]:
@@ -310,19 +325,14 @@ def _summarise(
     labels: list[str],
     number: np.ndarray,
     solution: Solution,
+    reached: np.ndarray,
     starts: int,
 ) -> CrossValidation:
-    cost = np.where(np.isfinite(solution.cost), solution.cost, np.inf).reshape(len(labels), starts)
-    best = cost.argmin(axis=1)
     space = full.space
     pooled = full.comparison.copy(deep=True)
     folds, values = [], []
     for k, (label, mask) in enumerate(zip(labels, held, strict=True)):
-        lowest = float(cost[k, best[k]])
-        if not math.isfinite(lowest):
-            raise FitError(f"without {label} no start gave finite residuals: check the data and the bounds")
-        lane = k * starts + int(best[k])
-        unknowns = _with_labels_filled(space, solution.u[lane], full.data, mask)
+        unknowns = _with_labels_filled(space, solution.u[k], full.data, mask)
         found = np.clip(space.to_parameters(unknowns), space.lower, space.upper)
         table = compare(space.build(found), full.data, dataset, (space, space.to_unknowns(found)))
         for name in table.data_vars:
@@ -334,10 +344,10 @@ def _summarise(
                 label=label,
                 held_out=mask,
                 values=dict(zip(space.names, map(float, found), strict=True)),
-                chi2=2.0 * lowest,
+                chi2=2.0 * float(solution.cost[k]),
                 # a stalled lane has found nothing lower however short the step: a minimum but for rounding
-                converged=bool(solution.converged[lane] or solution.status[lane] == Status.STALLED),
-                reached=int((cost[k] <= lowest * (1.0 + SAME_OPTIMUM)).sum()),
+                converged=bool(solution.converged[k] or solution.status[k] == Status.STALLED),
+                reached=int(reached[k]),
                 prediction=prediction_errors(table, mask),
             )
         )
@@ -390,7 +400,10 @@ def _badness(prediction: Prediction) -> float:
 
 
 def _text(prediction: Prediction) -> str:
-    text = f"{prediction.intensity_rms:.2%} rms ({prediction.intensity_max:.2%} at most)"
+    text = (
+        f"{prediction.intensity_rms:.2%} rms (median {prediction.intensity_median:.2%}, at most "
+        f"{prediction.intensity_max:.2%})"
+    )
     if math.isfinite(prediction.dolp_rms):
         text += f", the DoLP by {prediction.dolp_rms:.4f} rms"
     return text

@@ -176,7 +176,7 @@ class ErrorAnalysis:
         Over ``geometry``, in the order of the data set: ``intensity_error`` (1/sr), ``relative_error``,
         ``dolp_error``, the signed ``offset`` from the mirror direction (rad), ``near_specular`` and ``held_out``.
     groups
-        One entry a group, in the order in which the groups first appear.
+        One entry a group, sorted.
     intensity, relative, dolp
         Errors over all points.
     structure
@@ -241,9 +241,7 @@ def error_analysis(result: FitResult) -> ErrorAnalysis:
         },
         coords=table.coords,
     )
-    labels = (
-        np.array([str(v) for v in table["group"].values]) if "group" in table.coords else np.full(size, "0")
-    )
+    labels = table["group"].values
 
     def point(index: int) -> PointError:
         return PointError(
@@ -290,7 +288,7 @@ def error_analysis(result: FitResult) -> ErrorAnalysis:
         return found
 
     groups, fitted_sets = [], []
-    for label in dict.fromkeys(labels):
+    for label in np.unique(labels):
         members = labels == label
         fitted_sets.append(members & ~held)
         right = members & ~near & (offset > 0.0)

@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 __all__ = ["Estimate", "FitResult", "Optimum", "fit"]
 
 OBJECTIVES = ("stokes", "paper")
-#: A facet tilted by less than this many σ from the mirror direction counts as near-specular.
-NEAR_SPECULAR = 4.0
+#: A facet tilted by less than this many σ, but at most by this angle, counts as near-specular.
+NEAR_SPECULAR, NEAR_SPECULAR_LIMIT = 4.0, math.radians(15.0)
 
 
 @dataclass(frozen=True)
@@ -484,7 +484,8 @@ def _summarise(
     model = space.build(values)
     comparison = compare(model, observations, dataset, (space, space.to_unknowns(values)))
     comparison["held_out"] = ("geometry", held)
-    near = comparison["facet_tilt"].values < math.atan(NEAR_SPECULAR * float(model.values["sigma"]))
+    lobe = min(math.atan(NEAR_SPECULAR * float(model.values["sigma"])), NEAR_SPECULAR_LIMIT)
+    near = comparison["facet_tilt"].values < lobe
     comparison["near_specular"] = ("geometry", near)
 
     chi2 = 2.0 * float(solution.cost[best])

@@ -73,7 +73,7 @@ class NoiseModel:
 
     @classmethod
     def parse(cls, text: str) -> NoiseModel:
-        """Read ``"RELATIVE"`` or ``"RELATIVE,ABSOLUTE"``; each a number or a percentage like ``2%``.
+        """Read ``"RELATIVE,ABSOLUTE"``, or one number for both; each a number or a percentage like ``2%``.
 
         Raises
         ------
@@ -89,7 +89,7 @@ class NoiseModel:
             raise FitError(
                 f"noise {text!r}: give RELATIVE or RELATIVE,ABSOLUTE, for example 0.02,0.001 or 2%,0.1%"
             ) from None
-        return cls(*numbers)
+        return cls(numbers[0], numbers[-1])
 
     def standard_uncertainty(self, channel: str, intensity: np.ndarray, scale: np.ndarray) -> np.ndarray:
         """See :class:`Noise`."""

@@ -296,14 +296,14 @@ def _range(result: FitResult) -> list[Finding]:
         "θ_r": np.rad2deg(data.theta_r[used]),
         "facet tilt": np.rad2deg(_tilt(result)[used]),
     }
-    off_plane = np.rad2deg(_off_plane(data.phi[used]))
+    off_plane = np.rad2deg(np.arcsin(np.abs(np.sin(data.phi[used]))))
     azimuth = np.rad2deg(np.abs(np.arctan2(np.sin(data.phi[used]), np.cos(data.phi[used]))))
-    shown = [f"{name} {values.min():.3g}–{values.max():.3g}°" for name, values in ranges.items()]
+    shown = [f"{name} {values.min():.1f}–{values.max():.1f}°" for name, values in ranges.items()]
     if off_plane.max() < 1.0:
         shown.append("azimuth in the plane of incidence only")
         beyond = "Beyond that, and everywhere out of the plane of incidence, predictions are extrapolation."
     else:
-        shown.append(f"|φ| {azimuth.min():.3g}–{azimuth.max():.3g}°")
+        shown.append(f"|φ| {azimuth.min():.0f}–{azimuth.max():.0f}°")
         beyond = "Beyond that predictions are extrapolation."
     sentence = f"The fit rests on {int(used.sum())} geometries: {', '.join(shown)}. {beyond}"
     findings = [Finding("range", Severity.NOTE, sentence)]
@@ -338,8 +338,3 @@ def _used(result: FitResult) -> np.ndarray:
 def _tilt(result: FitResult) -> np.ndarray:
     """Tilt of the mirror facet at the fitted geometries in radians, shape (G,)."""
     return result.comparison["facet_tilt"].values[~result.comparison["held_out"].values]
-
-
-def _off_plane(phi: np.ndarray) -> np.ndarray:
-    """Angle in radians between the plane of view and the plane of incidence, 0 … π/2."""
-    return np.arcsin(np.minimum(np.abs(np.sin(phi)), 1.0))

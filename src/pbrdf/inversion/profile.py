@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -40,6 +40,9 @@ NEAR = 0.02
 
 #: A curve goes on beyond both ends by this part of their distance from the optimum, a contour's grid by half of it.
 MARGIN = 0.5
+
+#: How often curves and grids are gone over again from neighbouring points that have a lower χ².
+PASSES = 4
 
 #: An optimum counts as better if its χ² is lower by more than this part of the threshold.
 BETTER = 1e-3
@@ -114,7 +117,8 @@ class Contour:
     rises
         Threshold of each level: the region is where ``chi2_rise`` is at most this.
     grid
-        ``chi2_rise`` over the two parameters, dimensions (``a``, ``b``), coordinates in their own units.
+        ``chi2_rise`` over the two parameters, dimensions (``a``, ``b``), coordinates in their own units; NaN far
+        outside the largest region.
     better, better_chi2, notes
         As in :class:`Profile`.
     """
@@ -133,9 +137,10 @@ def profile(
 ) -> Profile:
     """Profile-likelihood intervals of free parameters.
 
-    An interval is the connected set around the optimum in which χ², minimised over the other parameters, stays
-    within the threshold of :func:`rise_of_chi2`. For a parameter whose optimum lies on a bound the threshold is
-    conservative: the interval holds the true value at least as often as the level says.
+    An interval reaches from the lowest to the highest value found at which χ², minimised over the other
+    parameters, stays within the threshold of :func:`rise_of_chi2`; a second optimum within the threshold lies
+    inside. For a parameter whose optimum lies on a bound the threshold is conservative: the interval holds the
+    true value at least as often as the level says.
 
     Parameters
     ----------
@@ -166,10 +171,10 @@ def profile(
     _check_points(points)
     optima = Optima.of(result)
     rise = rise_of_chi2(result, level, 1)
-    ends = interval_ends(optima, np.array([rise]), columns)
     best = optima.u[0]
+    # all parameters are searched whichever are asked for: each may lead the others to a lower χ²
+    ends = interval_ends(optima, np.array([rise]), range(len(best))).of(columns)
 
-    held = np.repeat(np.eye(len(best), dtype=bool)[columns], points, axis=0)
     starts = []
     for number, column in enumerate(columns):
         middle = best[column]
@@ -182,7 +187,7 @@ def profile(
         start = best + ends.path[0, side] * (along - middle)[:, None]
         start[:, column] = along
         starts.append(start)
-    curve = optima.refit(held, np.concatenate(starts)[None])
+    curve = _curves(optima, np.repeat(columns, points), np.concatenate(starts), rise)
     chi2, u = curve.chi2[0].reshape(-1, points), curve.u[0].reshape(len(columns), points, -1)
     refitted = result.space.to_parameters(u)
     curves = xr.Dataset(
@@ -276,9 +281,9 @@ def contour(
     _check_points(points)
     rises = {float(level): rise_of_chi2(result, level, 2) for level in levels}
     optima = Optima.of(result)
-    # the largest region's shadow on an axis is the profile interval at the region's own threshold
-    ends = interval_ends(optima, np.array([max(rises.values())]), columns)
     best = optima.u[0]
+    # the largest region's shadow on an axis is the profile interval at the region's own threshold
+    ends = interval_ends(optima, np.array([max(rises.values())]), range(len(best))).of(columns)
     axes = []
     for number, column in enumerate(columns):
         lower, upper = ends.value[0, 2 * number : 2 * number + 2]
@@ -286,12 +291,8 @@ def contour(
         low, high = max(lower - margin, optima.low[column]), min(upper + margin, optima.high[column])
         axes.append(np.linspace(low, high, points))
 
-    held = np.zeros((points * points, len(best)), dtype=bool)
-    held[:, columns] = True
-    grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
-    start = best + (grid - best[columns]) @ optima.plane(columns)
-    start[:, columns] = grid
-    refit = optima.refit(held, start[None])
+    grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+    refit = _grid(optima, columns, grid, max(rises.values()))
     values = []
     for axis, column in zip(axes, columns, strict=True):
         at = np.tile(best, (points, 1))
@@ -462,22 +463,6 @@ class Optima:
         shape = (sets, lanes)
         return Refit(solution.u.reshape(start.shape), chi2.reshape(shape), settled.reshape(shape))
 
-    def plane(self, columns: Sequence[int]) -> np.ndarray:
-        """Change of all unknowns of the first data set per unit change of some, the others refitted, to first order.
-
-        Shape (len(columns), P).
-        """
-        chosen = np.isin(np.arange(len(self.low)), columns)
-        others = np.flatnonzero(~(chosen | self.at_bound[0]))
-        result = np.zeros((len(columns), len(self.low)))
-        if len(others):
-            spread = prior_spread(self.low, self.high)[others]
-            matrix = self.information[0]
-            inverse = covariance(matrix[np.ix_(others, others)], spread)
-            result[:, others] = -matrix[np.ix_(np.asarray(columns), others)] @ inverse
-        result[np.arange(len(columns)), list(columns)] = 1.0
-        return result
-
 
 @dataclass(frozen=True)
 class Ends:
@@ -506,12 +491,20 @@ class Ends:
     blocked: np.ndarray
     lowest: Lowest
 
+    def of(self, columns: Sequence[int]) -> Ends:
+        """Only the ends of some columns, where those of all unknowns are known."""
+        sides = (2 * np.asarray(columns)[:, None] + np.arange(2)).ravel()
+        names = ("value", "at_bound", "found", "path", "blocked")
+        return replace(self, **{name: getattr(self, name)[:, sides] for name in names})
+
 
 def interval_ends(optima: Optima, rise: np.ndarray, columns: Sequence[int]) -> Ends:
     """Where χ², minimised over the other unknowns, has risen by a threshold; all sides of all data sets at once.
 
     The root of the rise is nearly linear in the unknown, so a secant on it, kept inside its bracket, takes few
-    rounds. The first trial is the end that the Jacobian predicts.
+    rounds. The first trial is the end that the Jacobian predicts. Where the way of another unknown passes through
+    lower values of χ² further out, the search goes on from there: the interval reaches to the farthest value found
+    within the threshold, also where a local optimum of the others, or a barrier, lies between.
 
     Parameters
     ----------
@@ -585,6 +578,28 @@ def interval_ends(optima: Optima, rise: np.ndarray, columns: Sequence[int]) -> E
         end = np.where(done, end, reached)
         done = done | found
         trial = np.where(bracketed, halved, np.minimum(np.where(np.isnan(further), room, further), room))
+
+        # a point of any lane within the threshold and further out shows that this side's end lies beyond it
+        away = sign[:, None] * (refit.u - base[:, :1]).swapaxes(1, 2)[:, column]
+        away = np.where((root < target)[:, None, :], away, -np.inf)
+        lane = away.argmax(axis=2)
+        far = np.take_along_axis(away, lane[..., None], axis=2)[..., 0]
+        passed = far > (1.0 + 4.0 * PRECISION) * np.where(done, end, inner)
+        there = np.take_along_axis(refit.u, lane[..., None], axis=1)
+        inner_u = np.where(passed[..., None], there, inner_u)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            path = np.where(passed[..., None], (there - base) / far[..., None], path)
+            inner = np.where(passed, far, inner)
+            inner_root = np.where(passed, np.take_along_axis(root, lane, axis=1), inner_root)
+            ahead = np.clip(inner * target / inner_root, 1.1 * inner, 2.0 * inner)
+        beyond = passed & (outer <= inner)
+        outer, outer_root = np.where(beyond, np.inf, outer), np.where(beyond, np.inf, outer_root)
+        trial = np.where(
+            passed, np.where(np.isfinite(outer), 0.5 * (inner + outer), np.minimum(ahead, room)), trial
+        )
+        at_bound = np.where(passed, far >= room - margin[column], at_bound)
+        end = np.where(passed & at_bound, room, end)
+        done = np.where(passed, at_bound, done)
     value = np.where(at_bound, bound, optima.u[:, column] + sign * end)
     return Ends(value, at_bound, done, path * sign[:, None], blocked, lowest)
 
@@ -600,6 +615,85 @@ def _linearised(information: np.ndarray, prior: np.ndarray, at_bound: np.ndarray
         tangent[i, inside] = cov[:, j] / cov[j, j]
         error[i] = math.sqrt(cov[j, j])
     return tangent, error
+
+
+def _curves(optima: Optima, column: np.ndarray, start: np.ndarray, rise: float) -> Refit:
+    """Hold one unknown at each of N points, then try again from points nearby that have a lower χ².
+
+    ``column`` is the unknown that each point holds, shape (N,), ``start`` the unknowns, shape (N, P).
+    """
+    held = np.eye(len(optima.low), dtype=bool)[column]
+    rows = np.arange(len(column))
+    value = start[rows, column]
+    # a curve's points are equally spaced
+    spacing = np.array([np.ptp(value[column == c]) / max((column == c).sum() - 1, 1) for c in column])
+    found = optima.refit(held, start[None])
+    for _ in range(PASSES):
+        climb = np.where(np.isnan(found.chi2[0]), np.inf, found.chi2[0] - optima.chi2[0])
+        apart = (found.u[0][:, column].T - value[:, None]) / np.maximum(spacing, 1e-300)[:, None]
+        # a point a step away may cost a third of the threshold less before it is worth a trial
+        score = climb + 0.3 * rise * apart**2
+        score[rows, rows] = np.inf
+        source = score.argmin(axis=1)
+        tried = np.flatnonzero(score[rows, source] < climb)
+        if not _retry(optima, found, held, tried, source[tried], BETTER * rise):
+            break
+    return found
+
+
+def _grid(optima: Optima, columns: Sequence[int], grid: np.ndarray, rise: float) -> Refit:
+    """Hold two unknowns at the points of a grid, from the optimum outwards until χ² is well above the threshold.
+
+    Each point starts from its lowest neighbour, which follows a bent valley as it does a straight one; points
+    with no neighbour within twice the threshold are left out as NaN. ``grid`` has shape (A, B, 2).
+    """
+    shape, size = grid.shape[:2], len(optima.low)
+    number = np.pad(np.arange(shape[0] * shape[1]).reshape(shape), 1, mode="edge")
+    shifts = [(i, j) for i in range(3) for j in range(3) if (i, j) != (1, 1)]
+    around = np.stack([number[i : i + shape[0], j : j + shape[1]].ravel() for i, j in shifts], axis=-1)
+    points = grid.reshape(-1, 2)
+    held = np.zeros((len(points), size), dtype=bool)
+    held[:, list(columns)] = True
+    u = np.tile(optima.u[0], (len(points), 1))
+    u[:, list(columns)] = points
+    found = Refit(u[None], np.full((1, len(points)), math.nan), np.ones((1, len(points)), dtype=bool))
+
+    def retry(tried: np.ndarray, source: np.ndarray) -> bool:
+        return _retry(optima, found, held, tried, source, BETTER * rise)
+
+    step = np.maximum(np.abs(grid[-1, -1] - grid[0, 0]), 1e-300) / np.array(shape)
+    first = np.array([np.argmin((((points - optima.u[0][list(columns)]) / step) ** 2).sum(axis=1))])
+    retry(first, first)
+    visited = np.zeros(len(points), dtype=bool)
+    visited[first] = True
+    spare = PASSES
+    while spare:
+        climb = np.where(np.isnan(found.chi2[0]), np.inf, found.chi2[0] - optima.chi2[0])
+        source = np.take_along_axis(around, climb[around].argmin(axis=1)[:, None], axis=1)[:, 0]
+        worth = climb[source] < 2.0 * rise
+        tried = np.flatnonzero(worth & ~visited)
+        if len(tried):
+            retry(tried, source[tried])
+            visited[tried] = True
+            continue
+        tried = np.flatnonzero(worth & (climb[source] < climb))
+        spare = spare - 1 if retry(tried, source[tried]) else 0
+    return found
+
+
+def _retry(
+    optima: Optima, found: Refit, held: np.ndarray, tried: np.ndarray, source: np.ndarray, worth: float
+) -> bool:
+    """Refit some lanes of the first data set from the ends of others, keep what is lower; whether anything was."""
+    if not len(tried):
+        return False
+    start = np.where(held[tried], found.u[0, tried], found.u[0, source])
+    again = optima.refit(held[tried], start[None])
+    before = np.where(np.isnan(found.chi2[0, tried]), np.inf, found.chi2[0, tried])
+    lower = again.chi2[0] < before - worth
+    for name in ("u", "chi2", "settled"):
+        getattr(found, name)[0, tried[lower]] = getattr(again, name)[0, lower]
+    return bool(lower.any())
 
 
 def _clipped(space: Space, unknowns: np.ndarray) -> np.ndarray:

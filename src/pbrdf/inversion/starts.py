@@ -1,15 +1,44 @@
-"""Starting values that fill the space between the bounds."""
+"""Starting values that fill the space between the bounds.
+
+A Sobol sequence of our own, because importing SciPy's costs more time than a whole fit; the tests compare
+the two. Beyond 21 dimensions SciPy's is taken.
+"""
 
 from __future__ import annotations
 
 import numpy as np
-from scipy.stats import qmc
 
 __all__ = ["sobol_starts"]
 
+# Degree, coefficients of the primitive polynomial and initial direction numbers for dimensions 2, 3, …
+# Source: Joe and Kuo, SIAM J. Sci. Comput. 30, 2635 (2008), table new-joe-kuo-6.21201.
+_DIRECTIONS = (
+    (1, 0, (1,)),
+    (2, 1, (1, 3)),
+    (3, 1, (1, 3, 1)),
+    (3, 2, (1, 1, 1)),
+    (4, 1, (1, 1, 3, 3)),
+    (4, 4, (1, 3, 5, 13)),
+    (5, 2, (1, 1, 5, 5, 17)),
+    (5, 4, (1, 1, 5, 5, 5)),
+    (5, 7, (1, 1, 7, 11, 19)),
+    (5, 11, (1, 1, 5, 1, 1)),
+    (5, 13, (1, 1, 1, 3, 11)),
+    (5, 14, (1, 3, 5, 5, 31)),
+    (6, 1, (1, 3, 3, 9, 7, 49)),
+    (6, 13, (1, 1, 1, 15, 21, 21)),
+    (6, 16, (1, 3, 1, 13, 27, 49)),
+    (6, 19, (1, 1, 1, 15, 7, 5)),
+    (6, 22, (1, 3, 1, 15, 13, 25)),
+    (6, 25, (1, 1, 5, 5, 19, 61)),
+    (7, 1, (1, 3, 7, 11, 23, 15, 103)),
+    (7, 4, (1, 3, 7, 13, 13, 15, 69)),
+)
+_BITS = 30
+
 
 def sobol_starts(lower: np.ndarray, upper: np.ndarray, count: int, seed: int = 0) -> np.ndarray:
-    """Scrambled Sobol points in a box.
+    """Points of a Sobol sequence with a random digital shift, in a box.
 
     Parameters
     ----------
@@ -18,7 +47,7 @@ def sobol_starts(lower: np.ndarray, upper: np.ndarray, count: int, seed: int = 0
     count
         Number of points.
     seed
-        Seed of the scrambling.
+        Seed of the shift.
 
     Returns
     -------
@@ -26,7 +55,36 @@ def sobol_starts(lower: np.ndarray, upper: np.ndarray, count: int, seed: int = 0
         Shape (count, P). The points keep a distance of 5 % of the range from the bounds, where gradients of
         bounded parameters vanish.
     """
-    sampler = qmc.Sobol(len(lower), scramble=True, rng=np.random.default_rng(seed))
-    # whole powers of two keep the balance of the sequence; surplus points are dropped
-    points = sampler.random_base2(max(0, int(np.ceil(np.log2(max(count, 1))))))[:count]
+    size = len(lower)
+    if size > len(_DIRECTIONS) + 1:
+        from scipy.stats import qmc
+
+        sampler = qmc.Sobol(size, scramble=True, rng=np.random.default_rng(seed))
+        points = sampler.random_base2(int(np.ceil(np.log2(max(count, 1)))))[:count]
+    else:
+        shift = np.random.default_rng(seed).integers(0, 1 << _BITS, size)
+        points = ((_sobol_integers(size, count) ^ shift) + 0.5) / (1 << _BITS)
     return lower + (0.05 + 0.9 * points) * (upper - lower)
+
+
+def _sobol_integers(size: int, count: int) -> np.ndarray:
+    """First points of the sequence times 2^30, in Gray-code order, shape (count, size)."""
+    directions = np.zeros((size, _BITS), dtype=np.int64)
+    for d in range(size):
+        if d == 0:
+            m = [1] * _BITS
+        else:
+            degree, coefficients, initial = _DIRECTIONS[d - 1]
+            m = list(initial)
+            for i in range(degree, _BITS):
+                value = m[i - degree] ^ (m[i - degree] << degree)
+                for j in range(1, degree):
+                    if (coefficients >> (degree - 1 - j)) & 1:
+                        value ^= m[i - j] << j
+                m.append(value)
+        directions[d] = [m[i] << (_BITS - 1 - i) for i in range(_BITS)]
+    points = np.zeros((count, size), dtype=np.int64)
+    for n in range(1, count):
+        lowest_zero = (~(n - 1) & n).bit_length() - 1  # of n − 1
+        points[n] = points[n - 1] ^ directions[:, lowest_zero]
+    return points
