@@ -21,6 +21,8 @@ test: $(TEST_STAMP)
 benchmark: $(TEST_STAMP)
 	$(BIN)/python benchmarks/evaluation.py
 	$(BIN)/python benchmarks/fit.py
+	$(BIN)/python benchmarks/virtual_experiments.py
+	$(BIN)/python benchmarks/coverage.py
 
 $(VENV)/bin/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \

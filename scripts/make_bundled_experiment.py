@@ -63,6 +63,7 @@ def main() -> None:
             group=group,
             simulated=True,
             attrs={
+                "scale": "arbitrary",  # Table 1 is on a camera's scale, see pbrdf.data.paints
                 "title": f"Virtual pBRDF measurement of the paint {name}",
                 "source": "SIMULATED with the double-Gauss model, scripts/make_bundled_experiment.py",
                 "reference": "parameters: Zhang, Song, Zhao, Infrared and Laser Engineering 46(11), 1117002 (2017)",

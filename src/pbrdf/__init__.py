@@ -20,7 +20,17 @@ from pbrdf.errors import BackendError, DataError, FitError, ModelError, PbrdfErr
 if TYPE_CHECKING:
     from pbrdf.data import check, make_dataset, read, validate, write
     from pbrdf.data.paints import PAINTS, load_paint, open_experiment
-    from pbrdf.inversion import FitResult, HoldOut, NoiseModel, fit
+    from pbrdf.inversion import (
+        FitResult,
+        HoldOut,
+        NoiseModel,
+        Nuisance,
+        cross_validate,
+        directional_hemispherical_reflectance,
+        error_analysis,
+        fit,
+        plausibility,
+    )
     from pbrdf.models import DoubleGauss, Model, ReciprocalDoubleGauss, load_model
     from pbrdf.optics.mueller import coherency_eigenvalues
     from pbrdf.optics.stokes import aolp, docp, dolp, dop
@@ -30,7 +40,18 @@ __version__ = "0.1.0"
 _HOME = {
     "pbrdf.data": ("check", "make_dataset", "read", "validate", "write"),
     "pbrdf.data.paints": ("PAINTS", "load_paint", "open_experiment"),
-    "pbrdf.inversion": ("FitResult", "HoldOut", "NoiseModel", "fit"),
+    "pbrdf.inversion": (
+        "FitResult",
+        "HoldOut",
+        "NoiseModel",
+        "Nuisance",
+        "Nuisance",
+        "cross_validate",
+        "directional_hemispherical_reflectance",
+        "error_analysis",
+        "fit",
+        "plausibility",
+    ),
     "pbrdf.models": ("DoubleGauss", "Model", "ReciprocalDoubleGauss", "load_model"),
     "pbrdf.optics.mueller": ("coherency_eigenvalues",),
     "pbrdf.optics.stokes": ("aolp", "docp", "dolp", "dop"),
@@ -53,15 +74,19 @@ __all__ = [
     "aolp",
     "check",
     "coherency_eigenvalues",
+    "cross_validate",
+    "directional_hemispherical_reflectance",
     "docp",
     "dolp",
     "dop",
+    "error_analysis",
     "fit",
     "get_backend",
     "load_model",
     "load_paint",
     "make_dataset",
     "open_experiment",
+    "plausibility",
     "read",
     "set_backend",
     "validate",

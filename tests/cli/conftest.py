@@ -12,6 +12,7 @@ from pbrdf.cli.main import app
 def run(tmp_path, monkeypatch):
     """Run a command in an empty folder; returns the result, whose output and error streams are apart."""
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "110")
 
     def command(*arguments, code=0):
         result = CliRunner().invoke(app, [str(a) for a in arguments])

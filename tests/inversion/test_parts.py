@@ -121,13 +121,14 @@ def test_prediction_errors_by_hand():
     table = xr.Dataset(
         {
             "I_measured": ("geometry", [1.0, 2.0, 0.0, np.nan]),
-            "I_modelled": ("geometry", [1.1, 1.8, 1.0, 1.0]),
+            "I_modelled": ("geometry", [1.1, 1.8, 0.005, 1.0]),
             "dolp_measured": ("geometry", [0.1, 0.2, np.nan, 0.0]),
             "dolp_modelled": ("geometry", [0.1, 0.1, 0.5, 0.0]),
         }
     )
     errors = prediction_errors(table, np.array([True, True, True, True]))
     assert errors.count == 4
+    # 10 %, −10 %, and 0.005 against 0, relative to 5 % of the median 1
     assert errors.intensity_rms == pytest.approx(0.1) and errors.intensity_max == pytest.approx(0.1)
     assert errors.dolp_max == pytest.approx(0.1) and errors.dolp_rms == pytest.approx(0.1 / math.sqrt(3.0))
 

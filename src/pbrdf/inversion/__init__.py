@@ -2,9 +2,29 @@
 
 from __future__ import annotations
 
+from pbrdf.inversion.crossvalidation import cross_validate
+from pbrdf.inversion.erroranalysis import error_analysis
 from pbrdf.inversion.fit import Estimate, FitResult, Optimum, fit
 from pbrdf.inversion.holdout import HoldOut, Prediction
-from pbrdf.inversion.noise import NoiseModel
+from pbrdf.inversion.noise import EqualNoise, InstrumentNoise, NoiseModel
+from pbrdf.inversion.nuisance import Nuisance
 from pbrdf.inversion.observations import Observations
+from pbrdf.inversion.plausibility import directional_hemispherical_reflectance, plausibility
 
-__all__ = ["Estimate", "FitResult", "HoldOut", "NoiseModel", "Observations", "Optimum", "Prediction", "fit"]
+__all__ = [
+    "EqualNoise",
+    "Estimate",
+    "FitResult",
+    "HoldOut",
+    "InstrumentNoise",
+    "NoiseModel",
+    "Nuisance",
+    "Observations",
+    "Optimum",
+    "Prediction",
+    "cross_validate",
+    "directional_hemispherical_reflectance",
+    "error_analysis",
+    "fit",
+    "plausibility",
+]

@@ -462,6 +462,11 @@ def _apply_starts(
     first[:] = space.to_unknowns(values)
 
 
+def near_specular_tilt(model: Model) -> float:
+    """Facet tilt in radians below which a geometry counts as near-specular."""
+    return min(math.atan(NEAR_SPECULAR * float(model.values["sigma"])), NEAR_SPECULAR_LIMIT)
+
+
 def _summarise(
     dataset: xr.Dataset,
     observations: Observations,
@@ -484,8 +489,7 @@ def _summarise(
     model = space.build(values)
     comparison = compare(model, observations, dataset, (space, space.to_unknowns(values)))
     comparison["held_out"] = ("geometry", held)
-    lobe = min(math.atan(NEAR_SPECULAR * float(model.values["sigma"])), NEAR_SPECULAR_LIMIT)
-    near = comparison["facet_tilt"].values < lobe
+    near = comparison["facet_tilt"].values < near_specular_tilt(model)
     comparison["near_specular"] = ("geometry", near)
 
     chi2 = 2.0 * float(solution.cost[best])
@@ -606,6 +610,10 @@ def compare(
             result[f"{name}_{kind}"] = ("geometry", column, {"units": unit})
     tilt = facet_tilt(observations.theta_i, observations.theta_r, observations.phi)
     result["facet_tilt"] = ("geometry", tilt, {"units": "rad"})
+    # what the data were before they were brought to the scale of a BRDF
+    result.attrs.update(
+        {name: dataset.attrs[name] for name in ("quantity", "scale") if name in dataset.attrs}
+    )
     return result
 
 
@@ -694,10 +702,11 @@ def _notes(
     notes = []
     if "wavelength" in dataset.coords:
         wavelengths = np.unique(dataset["wavelength"].values)
-        if np.isfinite(wavelengths).sum() > 1:
+        by_wavelength = any(term.split == "wavelength" for term in result.space.terms)
+        if np.isfinite(wavelengths).sum() > 1 and not by_wavelength:
             notes.append(
-                f"One set of parameters was fitted to {len(wavelengths)} wavelengths at once; select one if the "
-                "colour of the coating matters."
+                f"One set of parameters was fitted to {len(wavelengths)} wavelengths at once; select one, or let a be "
+                "free for each, if the colour of the coating matters."
             )
     if not solution.converged[best]:
         notes.append(

@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 
 __all__ = ["HoldOut", "Prediction", "prediction_errors"]
 
+#: Intensities below this share of the median do not make relative errors larger.
+DARK = 0.05
 _KINDS = ("group", "theta_i", "theta_r", "wavelength", "fraction")
 
 
@@ -117,7 +119,8 @@ class Prediction:
     count
         Number of geometries.
     intensity_rms, intensity_median, intensity_max
-        Root mean square, median of the size, and largest size of the relative error of the intensity, 1.
+        Root mean square, median of the size, and largest size of the relative error of the intensity, 1. It is
+        relative to the measured value, but to no less than 5 % of the data's median: what is darker is noise.
     dolp_rms, dolp_max
         Root mean square and largest size of the error of the degree of linear polarisation, 1; NaN where no
         polarisation was measured.
@@ -141,7 +144,8 @@ def prediction_errors(comparison: xr.Dataset, where: np.ndarray) -> Prediction:
         measured = comparison[f"{channel}_measured"].values[where]
         error = comparison[f"{channel}_modelled"].values[where] - measured
         if relative:
-            error = error[measured > 0.0] / measured[measured > 0.0]
+            dark = DARK * float(np.nanmedian(np.abs(comparison[f"{channel}_measured"].values)))
+            error = error / np.maximum(measured, max(dark, np.finfo(float).tiny))
         return error[np.isfinite(error)]
 
     intensity, dolp = errors("I", relative=True), errors("dolp", relative=False)

@@ -156,12 +156,18 @@ def identifiability(result: FitResult) -> Identifiability:
         coords={"parameter": names},
     )
 
-    combinations = []
+    combinations: list[Combination] = []
+    told = set()
     for value, vector in zip(eigenvalues, vectors.T, strict=True):
         determined = bool(value >= UNDETERMINED)
         if determined and (np.diag(matrix) * vector**2).max() < TRADE_OFF * value:
             continue
-        combinations.append(_combination(optima, inside, spread * vector, matrix, spread, scale, determined))
+        found = _combination(optima, inside, spread * vector, matrix, spread, scale, determined)
+        # with the others refitted, two directions may come down to the same trade-off
+        pattern = frozenset((name, change > 0.0) for name, change in found.changes.items())
+        if pattern not in told:
+            combinations.append(found)
+            told.add(pattern)
     return Identifiability(
         eigenvalues,
         xr.DataArray(
@@ -234,7 +240,7 @@ def _combination(
         (low,), (high,) = ends
         move = f"moving it anywhere between {low:.3g} and {high:.3g}"
         cost = float(max(rise[0, lane[0]], rise[1, lane[1]]))
-    joined = named_as[0] if len(named_as) == 1 else f"{', '.join(named_as[:-1])} and {named_as[-1]}"
+    joined = _listed(named_as)
     if determined:
         opening = f"{joined} trade off"
     else:
@@ -253,7 +259,12 @@ def _move(changes: dict[str, float], before: np.ndarray) -> str:
             parts.append(f"{name} {'raised' if change > 0.0 else 'lowered'} by {amount} to {end}")
         else:
             parts.append(f"{'raising' if change > 0.0 else 'lowering'} {name} by {amount} to {end}")
-    return parts[0] + (" with " + " and ".join(parts[1:]) if parts[1:] else "")
+    return parts[0] + (f" with {_listed(parts[1:])}" if parts[1:] else "")
+
+
+def _listed(words: list[str]) -> str:
+    """``x``, ``x and y`` or ``x, y and z``."""
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
 
 
 def _numbers(value: float, change: float) -> tuple[str, str]:

@@ -628,16 +628,21 @@ def _curves(optima: Optima, column: np.ndarray, start: np.ndarray, rise: float) 
     # a curve's points are equally spaced
     spacing = np.array([np.ptp(value[column == c]) / max((column == c).sum() - 1, 1) for c in column])
     found = optima.refit(held, start[None])
-    for _ in range(PASSES):
+    lowered_before = False
+    for turn in range(2 * PASSES):
         climb = np.where(np.isnan(found.chi2[0]), np.inf, found.chi2[0] - optima.chi2[0])
         apart = (found.u[0][:, column].T - value[:, None]) / np.maximum(spacing, 1e-300)[:, None]
         # a point a step away may cost a third of the threshold less before it is worth a trial
         score = climb + 0.3 * rise * apart**2
+        # from below and from above in turn: the better branch may come from either side
+        score[apart <= 0.0 if turn % 2 else apart >= 0.0] = np.inf
         score[rows, rows] = np.inf
         source = score.argmin(axis=1)
         tried = np.flatnonzero(score[rows, source] < climb)
-        if not _retry(optima, found, held, tried, source[tried], BETTER * rise):
+        lower = _retry(optima, found, held, tried, source[tried], BETTER * rise)
+        if turn % 2 and not (lower or lowered_before):
             break
+        lowered_before = lower
     return found
 
 

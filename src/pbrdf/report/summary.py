@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pbrdf.inversion.fit import NEAR_SPECULAR, Estimate, FitResult
+from pbrdf.inversion.fit import NEAR_SPECULAR, Estimate, FitResult, near_specular_tilt
 from pbrdf.report.describe import cautions, illumination_in_words, shown_unit, wavelengths_in_words
 from pbrdf.report.numbers import brief, per_cent, with_error
 from pbrdf.report.subject import Report
@@ -341,9 +341,11 @@ def _dolp(error: float) -> str:
 
 
 def _remarks_on_errors(result: FitResult) -> list[str]:
-    tilt = math.degrees(math.atan(NEAR_SPECULAR * float(result.model.values["sigma"])))
+    tilt = near_specular_tilt(result.model)
+    in_sigma = math.tan(tilt) / float(result.model.values["sigma"])
+    width = f"{NEAR_SPECULAR:g} σ = " if in_sigma > NEAR_SPECULAR - 1e-6 else ""
     remarks = [
-        f"near-specular: the mirroring facet is tilted by less than {NEAR_SPECULAR:g} σ = {brief(tilt, 2)}°"
+        f"near-specular: the mirroring facet is tilted by less than {width}{brief(math.degrees(tilt), 2)}°"
     ]
     errors = [*result.fitted.values(), *result.predicted.values()]
     if any(p.intensity_rms > max(_DARK_DOMINATES * p.intensity_median, _LARGE) for p in errors):
