@@ -2,8 +2,8 @@
 
 Data sets are simulated on the bundled experiment's geometries: I, Q and U of a bundled paint with independent
 normal errors of 1 % of the intensity, the standard uncertainties known. Each is fitted from a rough guess that
-is the same for all and from the truth, and the better end counts; all fits of a paint are one batch. Two intervals are
-then asked whether they contain the paint's value:
+is the same for all and from the truth, and the better end counts; all fits of a paint are one batch. Two
+intervals are then asked whether they contain the paint's value:
 
 * value ± 1.96 standard errors, from the Jacobian at the optimum, and
 * the profile-likelihood interval (χ² + 3.84 with the others refitted), of all data sets in one batch too.
@@ -142,11 +142,12 @@ def draw(path: Path) -> None:
             regions.plot(*(result.estimates[k].value for k in ("t", "n")), "o", color=colour, ms=4)
         t, n = (pbrdf.load_paint("matte-white-thick").values[k] for k in ("t", "n"))
         curves.axhline(RISE, color=GREY, lw=1.0)
-        curves.text(0.99, RISE + 0.12, "95 %: 3.84", transform=curves.get_yaxis_transform(), ha="right")
+        curves.text(2.15, RISE + 0.12, "95 %: 3.84", ha="center")
         curves.set(xlabel="refractive index n", ylabel="χ² above its minimum", ylim=(0.0, 8.0))
         curves.set_title("Profile of one parameter")
         regions.plot(t, n, "+", color="black", ms=10, mew=1.6)
         regions.set(xlabel="polarised share t of the diffuse part", ylabel="refractive index n")
+        regions.locator_params(axis="x", nbins=5)
         regions.set_title("Joint regions of two: 68 % (thick), 95 %")
         handles = [
             Line2D([], [], color=colour, ls=line, label=label) for label, (_, colour, line) in cases.items()
