@@ -154,3 +154,49 @@ def test_an_unknown_option_is_named(run):
     result = run("fit", "white", "--stats", "3", code=2)
     assert "--stats" in result.output
     assert "--starts" in result.output
+
+
+def test_checks_are_reported_and_recorded(run, tmp_path):
+    """Plausibility and identifiability for every fit; intervals and folds where asked for."""
+    result = run(
+        *("fit", "cd-back", "--starts", "8", "--strategy", "stepwise", "--prior", "n=1.74,0.05"),
+        *("--profile", "--bootstrap", "20", "--cross-validate", "group", "-o", "out"),
+    )
+    for word in ("Plausible?", "Determined", "Residuals", "Folds", "profile, 95%", "bootstrap, 95%", "Steps"):
+        assert word in result.stdout
+    record = json.loads((tmp_path / "out" / "fit.json").read_text(encoding="utf-8"))
+    checks = record["checks"]
+    assert {finding["check"] for finding in checks["plausibility"]} >= {"energy", "realisability", "range"}
+    interval, estimate = checks["profile"]["intervals"]["t"], record["estimates"]["t"]
+    assert interval["lower"] < estimate["value"] < interval["upper"]
+    assert interval["upper"] - interval["lower"] == pytest.approx(3.92 * estimate["standard_error"], rel=0.05)
+    assert checks["bootstrap"]["samples"] == 20
+    assert [stage["name"] for stage in record["stages"]][-1] == "joint"
+
+
+def test_nuisance_terms_and_noise_of_an_instrument(run, tmp_path):
+    """Angles of nuisance terms are in degrees on the command line and in the record."""
+    run(
+        *("fit", "cd-back", "--starts", "4", "--nuisance", "angle~0,0.5", "--loss", "cauchy"),
+        *("--noise", "instrument:linear=1%,circular=5%", "-o", "out"),
+    )
+    record = json.loads((tmp_path / "out" / "fit.json").read_text(encoding="utf-8"))
+    angle = record["estimates"]["angle"]
+    assert angle["unit"] == "degree" and abs(angle["value"]) < 0.2 and angle["upper"] == pytest.approx(2.0)
+    assert record["noise"].startswith("stated: instrument: 0.01")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--strategy", "guess"), "choose one of joint, stepwise"),
+        (("--nuisance", "gains"), "choose one of gain, dark, angle, source"),
+        (("--prior", "n=1.5"), "a prior is MEAN,STD"),
+        (("--split", "a"), "give NAME=VALUE"),
+        (("--loss", "l1"), "choose one of linear, soft_l1, huber, cauchy"),
+        (("--objective", "ours"), "choose one of stokes, paper"),
+        (("--noise", "instrument:gain=2"), "give instrument:linear"),
+    ],
+)
+def test_options_of_the_inversion_that_are_not_understood(refused, arguments, message):
+    assert message in refused("fit", "cd-back", "--starts", "4", *arguments)

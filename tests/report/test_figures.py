@@ -63,7 +63,7 @@ def test_held_out_points_have_open_markers(figure):
 
 def test_axes_have_names_and_units(figure):
     intensity, difference, dolp, _ = figure.axes
-    assert intensity.get_ylabel() == "intensity (1/sr)"
+    assert intensity.get_ylabel() == "intensity (arbitrary scale)"
     assert "(°)" in intensity.get_xlabel()
     assert dolp.get_ylabel() == "degree of linear polarisation"
     assert "%" in difference.get_ylabel()

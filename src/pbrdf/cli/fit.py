@@ -112,6 +112,16 @@ def fit(
     loss: Annotated[
         str, typer.Option(help="linear, or against outliers soft_l1, huber or cauchy.")
     ] = "linear",
+    profile: Annotated[
+        bool, typer.Option("--profile", help="Profile-likelihood intervals too: asymmetric, right at bounds.")
+    ] = False,
+    bootstrap: Annotated[
+        int, typer.Option(help="Simulated data sets for bootstrap intervals; 0 for none.", min=0)
+    ] = 0,
+    cross_validate: Annotated[
+        str | None,
+        typer.Option(help="Predict each fold from the others; folds by group, theta_i, angle or fraction."),
+    ] = None,
     seed: Annotated[int, typer.Option(help="Seed of the starts and of a held-out fraction.", min=0)] = 0,
     output: Annotated[
         Path | None,
@@ -140,6 +150,7 @@ def fit(
 
     With your own: `pbrdf fit paint.csv --column I=f_r_per_sr --noise 3%,1% --fix n=1.5`
     """
+    from pbrdf.report.checks import run_checks
     from pbrdf.report.files import FIGURE_FORMATS, require_writable, write_report
     from pbrdf.report.subject import Report
 
@@ -182,10 +193,21 @@ def fit(
         try:
             with progress_bar(f"Fitting {file}", quiet) as progress:
                 result = pbrdf.fit(dataset, chosen, progress=progress, **arguments)
+                checks = run_checks(
+                    result,
+                    dataset,
+                    profile=profile,
+                    bootstrap=bootstrap,
+                    cross_validate=cross_validate,
+                    fit_arguments={
+                        "model": chosen,
+                        **{k: v for k, v in arguments.items() if k != "hold_out"},
+                    },
+                )
         except FitError as error:
             raise FitError(f"{file}: {error}") from error
         settings = {"model": model, **arguments, "reading": reading.stated()}
-        report = Report(result, dataset, file, settings)
+        report = Report(result, dataset, file, settings, checks)
         written = write_report(report, folder, figure_format=figure_format)
         if quiet:
             print(folder)

@@ -28,6 +28,12 @@ from pbrdf.models.parameters import Parameter
 if TYPE_CHECKING:
     import xarray as xr
 
+    from pbrdf.inversion.bootstrap import Bootstrap
+    from pbrdf.inversion.erroranalysis import ErrorAnalysis
+    from pbrdf.inversion.identifiability import Identifiability
+    from pbrdf.inversion.plausibility import Finding
+    from pbrdf.inversion.profile import Contour, Profile
+
 __all__ = ["Estimate", "FitResult", "Optimum", "fit"]
 
 OBJECTIVES = ("stokes", "paper")
@@ -150,6 +156,43 @@ class FitResult:
     end_values: np.ndarray = field(default_factory=lambda: np.empty((0, 0)), repr=False)
     chi2_by_start: np.ndarray = field(default_factory=lambda: np.empty(0), repr=False)
     seconds: float = math.nan
+
+    # the further analyses live in modules of their own, which import this one
+    def profile(self, names: Sequence[str] | None = None, **options: Any) -> Profile:
+        """Profile-likelihood intervals, see :func:`pbrdf.inversion.profile.profile`."""
+        from pbrdf.inversion.profile import profile
+
+        return profile(self, names, **options)
+
+    def contour(self, a: str, b: str, **options: Any) -> Contour:
+        """Joint region of two parameters, see :func:`pbrdf.inversion.profile.contour`."""
+        from pbrdf.inversion.profile import contour
+
+        return contour(self, a, b, **options)
+
+    def bootstrap(self, count: int = 200, **options: Any) -> Bootstrap:
+        """Parametric bootstrap, see :func:`pbrdf.inversion.bootstrap.bootstrap`."""
+        from pbrdf.inversion.bootstrap import bootstrap
+
+        return bootstrap(self, count, **options)
+
+    def identifiability(self) -> Identifiability:
+        """What the data determine, see :func:`pbrdf.inversion.identifiability.identifiability`."""
+        from pbrdf.inversion.identifiability import identifiability
+
+        return identifiability(self)
+
+    def plausibility(self, dataset: xr.Dataset | None = None) -> list[Finding]:
+        """Physical plausibility, see :func:`pbrdf.inversion.plausibility.plausibility`."""
+        from pbrdf.inversion.plausibility import plausibility
+
+        return plausibility(self, dataset)
+
+    def error_analysis(self) -> ErrorAnalysis:
+        """Residuals as in the paper's section 2.3, see :mod:`pbrdf.inversion.erroranalysis`."""
+        from pbrdf.inversion.erroranalysis import error_analysis
+
+        return error_analysis(self)
 
 
 def fit(

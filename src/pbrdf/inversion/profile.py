@@ -14,7 +14,6 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from scipy import stats
 
 from pbrdf.errors import FitError
 from pbrdf.inversion.observations import Observations
@@ -335,10 +334,12 @@ def rise_of_chi2(result: FitResult, level: float, parameters: int) -> float:
     """
     if not 0.0 < level < 1.0:
         raise FitError(f"level={level:g}: a confidence level lies between 0 and 1, for example 0.95")
+    from scipy import special  # its quantiles: scipy.stats would take longer to import than the fit takes
+
     if result.std_known:
-        return float(stats.chi2.ppf(level, parameters))
+        return float(special.chdtri(parameters, 1.0 - level))
     freedom = result.goodness.data - result.goodness.free
-    ratio = float(stats.f.ppf(level, parameters, freedom))
+    ratio = float(special.fdtri(parameters, freedom, level))
     return parameters * ratio * result.goodness.reduced_chi2
 
 

@@ -146,6 +146,7 @@ def fit_record(report: Report) -> dict[str, Any]:
         "fitted_errors": {region: asdict(errors) for region, errors in result.fitted.items()},
         "predicted_errors": {region: asdict(errors) for region, errors in result.predicted.items()},
         "notes": result.notes,
+        "checks": None if report.checks is None else report.checks.record(result),
     }
     return plain(record)  # type: ignore[return-value]
 

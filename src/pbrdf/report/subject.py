@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from pbrdf.inversion.fit import FitResult
+    from pbrdf.report.checks import Checks
 
 __all__ = ["Report"]
 
@@ -28,9 +29,12 @@ class Report:
         What to call the data: a file or a bundled paint.
     settings
         How the fit was asked for, in plain values; kept with the numbers so that they can be had again.
+    checks
+        What else was looked at; None if nothing.
     """
 
     result: FitResult
     dataset: xr.Dataset
     name: str
     settings: Mapping[str, Any] = field(default_factory=dict)
+    checks: Checks | None = None

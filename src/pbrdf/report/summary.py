@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from rich.console import Console, RenderableType
     from rich.table import Table
 
+    from pbrdf.report.checks import Checks
+
 __all__ = [
     "correlation_in_words",
     "goodness_in_words",
@@ -95,10 +97,73 @@ def _parts(report: Report, verbose: bool, wide: bool) -> Iterator[RenderableType
     yield ""
     yield _error_table(result)
     yield Text("; ".join(_remarks_on_errors(result)), style="italic")
+    if report.checks is not None:
+        yield from _check_parts(report.checks, result, verbose)
     notes = [*result.notes, *cautions(report.dataset)]
     if notes:
         yield ""
         yield _headed([("Notes" if i == 0 else "", [note]) for i, note in enumerate(notes)])
+
+
+def _check_parts(checks: Checks, result: FitResult, verbose: bool) -> Iterator[RenderableType]:
+    """Findings beyond the fit: what was objected to, and with ``verbose`` all that was looked at."""
+    objections = [f.sentence for f in checks.plausibility if verbose or f.severity != "ok"]
+    sections = [
+        ("Plausible?", objections or ["nothing to object: energy, realisability, parameters, lobe, range"]),
+        ("Determined", list(checks.identifiability.sentences)),
+    ]
+    errors = checks.errors.sentences()
+    sections.append(("Residuals", errors if verbose else [errors[0], errors[-1]]))
+    if checks.cross_validation is not None:
+        sections.append(("Folds", checks.cross_validation.sentences()))
+    yield ""
+    yield _headed(
+        [(head if i == 0 else "", [line]) for head, lines in sections for i, line in enumerate(lines)]
+    )
+    if checks.profile is not None or checks.bootstrap is not None:
+        yield ""
+        yield _interval_table(checks, result)
+        notes = [
+            *(checks.profile.notes if checks.profile else ()),
+            *(checks.bootstrap.notes if checks.bootstrap else ()),
+        ]
+        if notes:
+            yield _headed([("Intervals" if i == 0 else "", [note]) for i, note in enumerate(notes)])
+
+
+def _interval_table(checks: Checks, result: FitResult) -> Table:
+    """Intervals of the free parameters by every method that was used."""
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    table.add_column("parameter")
+    table.add_column("± 1.96 standard errors")
+    if checks.profile is not None:
+        table.add_column(f"profile, {checks.profile.level:.0%}")
+    if checks.bootstrap is not None:
+        table.add_column(f"bootstrap, {checks.bootstrap.level:.0%}")
+    for name, estimate in result.estimates.items():
+        if estimate.verdict == "fixed":
+            continue
+        factor, _ = shown_unit(estimate.parameter)
+        spread = 1.96 * estimate.std
+        cells = [
+            "" if math.isnan(spread) else _interval(factor, estimate.value - spread, estimate.value + spread)
+        ]
+        if checks.profile is not None:
+            found = checks.profile.intervals.get(name)
+            cells.append("" if found is None else _interval(factor, found.lower, found.upper))
+        if checks.bootstrap is not None:
+            ends = checks.bootstrap.percentiles.sel(parameter=name).values
+            cells.append(_interval(factor, float(ends[0]), float(ends[1])))
+        table.add_row(name, *cells)
+    return table
+
+
+def _interval(factor: float, lower: float, upper: float) -> str:
+    width = abs(upper - lower) * factor
+    digits = 4 if width == 0.0 else max(0, 1 - math.floor(math.log10(width)))
+    return f"{factor * lower:.{digits}f} … {factor * upper:.{digits}f}".replace("-", "−")
 
 
 def _heading(report: Report) -> list[tuple[str, list[str]]]:
