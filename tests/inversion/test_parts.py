@@ -168,3 +168,26 @@ def test_the_papers_objective_compares_intensity_and_dolp():
         assert abs(fitted.estimates["t"].value - truth) < 4.0 * fitted.estimates["t"].std
     # equal weights let the bright lobe count more than the weak diffuse polarisation that t rests on
     assert result.estimates["t"].std > signed.estimates["t"].std
+
+
+def test_a_full_covariance_counts_as_generalised_least_squares():
+    """χ² = Σ rᵀ C⁻¹ r; a diagonal covariance is the standard uncertainties."""
+    dataset = pbrdf.open_experiment("cd-back")
+    names = ("I", "Q", "U", "V")
+    std = np.stack([dataset[f"{c}_std"].values for c in names])
+    plain = pbrdf.fit(dataset, starts=8)
+    diagonal = pbrdf.fit(dataset, starts=8, covariance=np.einsum("cg,cd->gcd", std**2, np.eye(4)))
+    for name, estimate in plain.estimates.items():
+        assert diagonal.estimates[name].value == pytest.approx(estimate.value, rel=1e-8)
+    correlation = np.eye(4)
+    correlation[0, 1] = correlation[1, 0] = 0.8
+    covariance = np.einsum("cg,cd,dg->gcd", std, correlation, std)
+    full = pbrdf.fit(dataset, starts=8, covariance=covariance)
+    residual = np.stack([full.comparison[f"{c}_residual"].values for c in names], axis=1)
+    chi2 = np.einsum("gc,gcd,gd->", residual, np.linalg.inv(covariance), residual)
+    assert full.goodness.chi2 == pytest.approx(chi2, rel=1e-9)
+    assert full.estimates["n"].std != pytest.approx(plain.estimates["n"].std, rel=0.05)
+    with pytest.raises(FitError, match=r"it must be \(63, 4, 4\)"):
+        pbrdf.fit(dataset, covariance=np.ones((3, 4, 4)))
+    with pytest.raises(FitError, match="geometry 0 is not symmetric and positive definite"):
+        pbrdf.fit(dataset, covariance=np.ones((63, 4, 4)))

@@ -6,6 +6,7 @@ from pbrdf.errors import DataError, ModelError
 from pbrdf.report.figures import data_figure, fit_figure, save_figure, starts_figure
 from pbrdf.report.model_figure import model_figure
 from pbrdf.report.style import DISTINCT_COLOURS, looks_of
+from pbrdf.report.subject import Report
 
 
 def lines(ax, label):
@@ -224,3 +225,13 @@ def test_curves_include_what_the_instrument_adds(report):
     points = lines(figure.axes[0], "measured")[0]
     at = np.interp(points.get_xdata(), curve.get_xdata(), curve.get_ydata())
     np.testing.assert_allclose(at, points.get_ydata(), rtol=0.05)
+
+
+def test_the_points_of_the_diffuse_step_are_marked():
+    """Stepwise: a white dot on every point outside the lobe, and none without the strategy."""
+    dataset = pbrdf.open_experiment("cd-back")
+    result = pbrdf.fit(dataset, starts=4, strategy="stepwise")
+    stepwise = fit_figure(Report(result, dataset, "cd-back"))
+    dots = [line for line in stepwise.axes[0].lines if line.get_label() == "diffuse step"]
+    assert sum(len(line.get_xdata()) for line in dots) == int(result.comparison["used_for_diffuse"].sum())
+    assert any("diffuse step" in label for label in legend(stepwise))

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from pbrdf.data.validate import validate
 from pbrdf.errors import FitError
@@ -214,6 +215,7 @@ def fit(
     starts: int = 64,
     noise: Noise | str | None = None,
     objective: str = "stokes",
+    covariance: ArrayLike | None = None,
     hold_out: HoldOut | str | None = None,
     seed: int = 0,
     max_iterations: int = 100,
@@ -262,6 +264,9 @@ def fit(
         Stated noise, an object of :mod:`pbrdf.inversion.noise` or its text like ``"0.02,0.01"``, ``"equal"`` or
         ``"instrument:linear=1%,quantum=1"``; None takes the uncertainties of the data set and, where it has
         none, the default of :class:`NoiseModel`.
+    covariance
+        Full covariance of the measured Stokes components at each geometry, shape (G, C, C) in the order I, Q, U,
+        V, on the data's own scale; it replaces all standard uncertainties.
     objective
         ``"stokes"``: signed Stokes components (or whatever was measured); ``"paper"``: intensity and DoLP with
         equal weights, as the paper does.
@@ -297,6 +302,8 @@ def fit(
     if objective not in OBJECTIVES:
         raise FitError(f"objective={objective!r}: choose one of {', '.join(OBJECTIVES)}")
     observations = Observations.from_dataset(dataset, noise, objective)
+    if covariance is not None:
+        observations = observations.with_covariance(np.asarray(covariance))
     held = hold_out.mask(dataset, seed) if hold_out else np.zeros(observations.values.shape[1], dtype=bool)
     fitted_data = observations.subset(~held)
     space, begin = _space(model, options or {}, fix or {}, free, bounds or {}, start or {}, fitted_data)

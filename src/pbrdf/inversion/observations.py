@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -37,6 +37,9 @@ class Observations:
         Stokes vector of the source.
     std_known
         Whether every standard uncertainty comes from the data set; if not, their scale is a guess.
+    whitening
+        Lower triangular factors W with WᵀW the inverse covariance of the channels at a geometry, shape
+        (C, C, G); None where the channels are independent and 1/std serves.
     group, wavelength
         Labels and wavelengths (nm) of the geometries, shape (G,); None where there are none.
     scale
@@ -54,6 +57,7 @@ class Observations:
     group: np.ndarray | None = None
     wavelength: np.ndarray | None = None
     scale: np.ndarray | None = None
+    whitening: np.ndarray | None = None
 
     @classmethod
     def from_dataset(
@@ -144,6 +148,11 @@ class Observations:
         """1/std, 0 where nothing was measured; shape (C, G)."""
         return 1.0 / self.std
 
+    def weighted_factor(self, i: int, j: int) -> np.ndarray:
+        """Element (i, j) of the whitening factors, 0 where nothing was measured; shape (G,)."""
+        assert self.whitening is not None
+        return np.where(np.isfinite(self.std).all(axis=0), self.whitening[i, j], 0.0)
+
     @property
     def count(self) -> int:
         """Number of measured values."""
@@ -156,16 +165,56 @@ class Observations:
 
     def subset(self, keep: np.ndarray) -> Observations:
         """Only some geometries; ``keep`` is a mask or an index array of shape (G,)."""
-        return Observations(
-            self.theta_i[keep],
-            self.theta_r[keep],
-            self.phi[keep],
-            self.channels,
-            self.values[:, keep],
-            self.std[:, keep],
-            self.illumination,
-            self.std_known,
-            *(None if a is None else a[keep] for a in (self.group, self.wavelength, self.scale)),
+        chosen = {
+            name: None if column is None else column[keep]
+            for name in ("theta_i", "theta_r", "phi", "group", "wavelength", "scale")
+            for column in [getattr(self, name)]
+        }
+        whitening = None if self.whitening is None else self.whitening[:, :, keep]
+        return replace(
+            self, values=self.values[:, keep], std=self.std[:, keep], whitening=whitening, **chosen
+        )
+
+    def with_covariance(self, covariance: np.ndarray) -> Observations:
+        """The same data with the full covariance of the channels at each geometry.
+
+        Parameters
+        ----------
+        covariance
+            Shape (G, C, C) in the order of ``channels``, on the data's own scale.
+
+        Raises
+        ------
+        FitError
+            If the shape is another, or a matrix is not symmetric and positive definite.
+        """
+        covariance = np.asarray(covariance, dtype=float)
+        size = len(self.channels)
+        if covariance.shape != (self.values.shape[1], size, size):
+            raise FitError(
+                f"covariance has shape {covariance.shape}: it must be ({self.values.shape[1]}, {size}, {size}), for "
+                f"every geometry the covariance of {', '.join(self.channels)}"
+            )
+        scale = np.ones(len(covariance)) if self.scale is None else self.scale
+        covariance = covariance * (scale**2)[:, None, None]
+        measured = np.isfinite(self.std).all(axis=0)
+        symmetric = np.abs(covariance - covariance.transpose(0, 2, 1)).max(axis=(1, 2))
+        whitening = np.zeros_like(covariance)
+        for row in np.flatnonzero(measured):
+            try:
+                if not symmetric[row] <= 1e-9 * np.abs(covariance[row]).max():
+                    raise np.linalg.LinAlgError
+                whitening[row] = np.linalg.inv(np.linalg.cholesky(covariance[row]))
+            except np.linalg.LinAlgError:
+                raise FitError(
+                    f"covariance of geometry {row} is not symmetric and positive definite"
+                ) from None
+        std = np.sqrt(np.einsum("gcc->cg", covariance))
+        return replace(
+            self,
+            std=np.where(measured, std, np.inf),
+            std_known=True,
+            whitening=np.ascontiguousarray(whitening.transpose(1, 2, 0)),
         )
 
 

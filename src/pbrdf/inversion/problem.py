@@ -165,6 +165,14 @@ def residuals(
     Float, UInt32 = backend.Float, backend.UInt32
     points = first.values.shape[1]
     signals = _Signals(space, data, accuracy)
+    factors = None
+    if first.whitening is not None:
+        size = len(first.channels)
+        factors = {
+            (i, j): backend.upload(Float, np.concatenate([o.weighted_factor(i, j) for o in data]))
+            for i in range(size)
+            for j in range(i + 1)
+        }
     measured, weights = (
         [
             backend.upload(Float, np.concatenate([getattr(o, what)[c] for o in data]))
@@ -179,6 +187,15 @@ def residuals(
         number = lane // divisor
         modelled, alive = signals(u, number, point, first.channels)
         at = number * stride + point
+        if factors is not None:
+            differences = [m - dr.gather(Float, y, at) for m, y in zip(modelled, measured, strict=True)]
+            correlated: list[Any] = []
+            for i in range(len(differences)):
+                total = differences[0] * dr.gather(Float, factors[i, 0], at)
+                for j in range(1, i + 1):
+                    total = dr.fma(differences[j], dr.gather(Float, factors[i, j], at), total)
+                correlated.append(total)
+            return correlated, alive
         weighted = [
             (m - dr.gather(Float, y, at)) * dr.gather(Float, w, at)
             for m, y, w in zip(modelled, measured, weights, strict=True)

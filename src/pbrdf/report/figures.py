@@ -307,6 +307,17 @@ def _legend(
     mark: dict[str, Any] = {"color": GREY, "marker": "o", "linestyle": "none"}
     if any(held.any() and not held.all() for *_, held in entries):
         handles.append(Line2D([], [], markerfacecolor="white", label="held out", **mark))
+    if points.diffuse is not None and cuts:
+        handles.append(
+            Line2D(
+                [],
+                [],
+                markerfacecolor="white",
+                markeredgewidth=2.0,
+                label="white dot: used for the diffuse step",
+                **mark,
+            )
+        )
     if modelled and cuts:
         bars = np.isfinite(points.intensity.std).any()
         handles.append(

@@ -93,6 +93,17 @@ def cut_panel(
                 label=_label_of_points(filled),
                 zorder=3,
             )
+        if points.diffuse is not None:
+            used = points.diffuse[cut.rows]
+            ax.plot(
+                cut.x[used],
+                channel.measured[cut.rows[used]],
+                "o",
+                color="white",
+                markersize=2.0,
+                label="diffuse step",
+                zorder=4,
+            )
     ax.set_xlabel(_INCIDENCE if cuts[0].kind == "theta_r" else VIEWING_ANGLE)
     ax.set_ylabel(channel_label(name, points))
     if name == "intensity":

@@ -49,6 +49,8 @@ class Points:
         measured.
     arbitrary_scale
         Whether the intensity has an unknown constant factor.
+    diffuse
+        Whether a stepwise fit used the point for its diffuse step, shape (G,); None without such a step.
     """
 
     theta_i: np.ndarray
@@ -59,6 +61,7 @@ class Points:
     intensity: Channel
     dolp: Channel | None
     arbitrary_scale: bool
+    diffuse: np.ndarray | None = None
 
     @classmethod
     def from_fit(cls, report: Report) -> Points:
@@ -93,6 +96,7 @@ class Points:
             intensity=Channel(column("I_measured"), column("I_std"), column("I_modelled")),
             dolp=dolp,
             arbitrary_scale=bare.arbitrary_scale,
+            diffuse=comparison["used_for_diffuse"].values if "used_for_diffuse" in comparison else None,
         )
 
     @classmethod
