@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -165,7 +165,7 @@ class Observations:
 
     def subset(self, keep: np.ndarray) -> Observations:
         """Only some geometries; ``keep`` is a mask or an index array of shape (G,)."""
-        chosen = {
+        chosen: dict[str, Any] = {
             name: None if column is None else column[keep]
             for name in ("theta_i", "theta_r", "phi", "group", "wavelength", "scale")
             for column in [getattr(self, name)]
