@@ -330,8 +330,6 @@ def residual_structure(sequences: Sequence[np.ndarray]) -> Structure:
     Structure
         Of all sequences together.
     """
-    from scipy.special import bdtr  # not scipy.stats, which takes longer to import than the fit takes
-
     positive = negative = runs = 0
     distribution = np.ones(1)  # of the number of runs over the sequences so far
     for sequence in sequences:
@@ -348,10 +346,18 @@ def residual_structure(sequences: Sequence[np.ndarray]) -> Structure:
         negative=negative,
         runs=runs,
         expected_runs=float(np.arange(len(distribution)) @ distribution),
-        # two-sided binomial test of p = ½, whose tails are equal
-        p_sign=min(1.0, 2.0 * float(bdtr(min(positive, negative), total, 0.5))) if total else 1.0,
+        p_sign=_sign_test(positive, negative),
         p_runs=min(float(distribution[: runs + 1].sum()), 1.0),
     )
+
+
+def _sign_test(positive: int, negative: int) -> float:
+    """Two-sided binomial test of p = ½; both tails are equal."""
+    total, fewer = positive + negative, min(positive, negative)
+    log_factorial = np.concatenate([[0.0], np.cumsum(np.log(np.arange(1, total + 1)))])
+    k = np.arange(fewer + 1)
+    tail = log_factorial[total] - log_factorial[k] - log_factorial[total - k] - total * math.log(2.0)
+    return min(1.0, 2.0 * float(np.exp(tail).sum()))
 
 
 def _run_probabilities(positive: int, negative: int) -> np.ndarray:

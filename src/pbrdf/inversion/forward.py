@@ -13,7 +13,7 @@ import drjit as dr
 import numpy as np
 
 from pbrdf.models.base import Model
-from pbrdf.models.evaluation import horizon_guard
+from pbrdf.models.evaluation import horizon_guard, is_zero, weighted_sum
 from pbrdf.optics.geometry import Geometry, dot, geometry_from_angles
 
 __all__ = ["channel_values", "measured_mueller"]
@@ -88,7 +88,7 @@ def _averaged_specular(model: Model, geometry: Geometry, roles: Mapping[str, Any
     count = len(_DISC[0])
     names = [name for name in roles if roles[name] is not None]
     template = model.kernel(geometry, roles, "specular")
-    used = [(i, j) for i in range(4) for j in range(4) if not isinstance(template[i][j], float)]
+    used = [(i, j) for i in range(4) for j in range(4) if not is_zero(template[i][j])]
 
     def body(k: Any, total: Any, geometry: Geometry, values: Any) -> tuple[Any, ...]:
         named = {**roles, **dict(zip(names, values, strict=True))}
@@ -127,7 +127,7 @@ def _turned(geometry: Geometry, along_p: Any, along_s: Any) -> Geometry:
 
 
 def _masked(visible: Any, value: Any) -> Any:
-    return 0.0 if isinstance(value, float) and value == 0.0 else dr.select(visible, value, 0.0)
+    return 0.0 if is_zero(value) else dr.select(visible, value, 0.0)
 
 
 def channel_values(
@@ -148,10 +148,7 @@ def channel_values(
     """
 
     def stokes(i: int) -> Any:
-        total: Any = 0.0
-        for j in range(4):
-            if incident[j] != 0.0 and not (isinstance(f[i][j], float) and f[i][j] == 0.0):
-                total = total + f[i][j] * incident[j]
+        total = weighted_sum(f[i], incident)
         total = total if gain is None else total * gain
         return total + dark if i == 0 and dark is not None else total
 

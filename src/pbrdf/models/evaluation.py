@@ -66,7 +66,7 @@ def kernel_from_angles(model: Model, theta_i: Any, theta_r: Any, phi: Any, value
 
     theta_i, theta_r, visible = horizon_guard(theta_i, theta_r)
     f = model.kernel(geometry_from_angles(theta_i, theta_r, phi), values, part)
-    return [[0.0 if _is_zero(x) else dr.select(visible, x, 0.0) for x in row] for row in f]
+    return [[0.0 if is_zero(x) else dr.select(visible, x, 0.0) for x in row] for row in f]
 
 
 def horizon_guard(theta_i: Any, theta_r: Any) -> tuple[Any, Any, Any]:
@@ -93,7 +93,7 @@ def stokes(model: Model, theta_i: Any, theta_r: Any, phi: Any, incident: Any, pa
     S = check_incident(incident)
 
     def function(matrix: Any) -> list[Any]:
-        return [_weighted_sum(row, S) for row in matrix]
+        return [weighted_sum(row, S) for row in matrix]
 
     return _evaluate(model, theta_i, theta_r, phi, part, function, (4,))
 
@@ -132,15 +132,17 @@ def _depth(incident: Any) -> int:
         return 1
 
 
-def _weighted_sum(row: Sequence[Any], weights: Sequence[float]) -> Any:
+def weighted_sum(row: Sequence[Any], weights: Sequence[float]) -> Any:
+    """Σ row·weights over Dr.Jit floats; what is zero by structure is left out of the kernel."""
     total: Any = 0.0
     for value, weight in zip(row, weights, strict=True):
-        if weight != 0.0 and not _is_zero(value):
+        if weight != 0.0 and not is_zero(value):
             total = total + (value if weight == 1.0 else value * weight)
     return total
 
 
-def _is_zero(value: Any) -> bool:
+def is_zero(value: Any) -> bool:
+    """Whether a matrix element is the Python number 0: zero by structure."""
     return isinstance(value, float) and value == 0.0
 
 
