@@ -340,7 +340,6 @@ def residual_structure(sequences: Sequence[np.ndarray]) -> Structure:
         positive, negative = positive + above, negative + len(signs) - above
         runs += 1 + int((signs[1:] != signs[:-1]).sum())
         distribution = np.convolve(distribution, _run_probabilities(above, len(signs) - above))
-    total = positive + negative
     return Structure(
         positive=positive,
         negative=negative,
