@@ -141,12 +141,12 @@ def facet_average(
         values = integrand(m, mu_i, mu_r, geometry, args)
         return [dr.fma(weight, value, t) for value, t in zip(values, total, strict=True)]
 
-    # the rule enters as data, so that all accuracies share one kernel
+    # the rule enters as opaque data, so that all accuracies share one kernel
     rule = ACCURACIES[accuracy]
-    step, steepness = F([rule.step]), F([rule.steepness])
+    step, steepness = dr.opaque(F, rule.step), dr.opaque(F, rule.steepness)
     flatness = dr.rcp(steepness)
-    half, axis_nodes = F([float(rule.half)]), UInt([2 * rule.half + 1])
-    wedge_lanes = needs_wedge(c_i, c_r, sigma) | (UInt([int(rule.clear)]) == 0)
+    half, axis_nodes = dr.opaque(F, float(rule.half)), dr.opaque(UInt, 2 * rule.half + 1)
+    wedge_lanes = needs_wedge(c_i, c_r, sigma) | (dr.opaque(UInt, int(rule.clear)) == 0)
     narrow = sigma <= SIGMA_12
     offset = dr.select(narrow, UInt(0), UInt(3))
     count = dr.select(wedge_lanes, UInt(0), dr.select(narrow, UInt(3), UInt(7)))
