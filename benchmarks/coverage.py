@@ -66,7 +66,7 @@ def coverage(
     exact = experiment(paint, positions)
     data = simulate(exact, exact.values, count, np.random.default_rng(seed))
     box = space()
-    low, high = box.to_unknowns(box.lower), box.to_unknowns(box.upper)
+    low, high = box.box
     truth = np.array([pbrdf.load_paint(paint).values[name] for name in NAMES], dtype=float)
     clock = time.perf_counter()
     starts = np.tile(box.to_unknowns(np.stack([GUESS, truth])), (count, 1))

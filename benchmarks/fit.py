@@ -71,14 +71,14 @@ def space() -> Space:
 
 def fit_batch(data: list[Observations]) -> tuple[float, np.ndarray]:
     """Seconds and parameters (B, 6) of one batched solution."""
-    box = space()
-    low, high = box.to_unknowns(box.lower), box.to_unknowns(box.upper)
-    start = np.tile(box.to_unknowns(GUESS), (len(data), 1))
+    problem = space()
+    low, high = problem.box
+    start = np.tile(problem.to_unknowns(GUESS), (len(data), 1))
     clock = time.perf_counter()
-    solution = solve(residuals(box, data), start, low, high)
+    solution = solve(residuals(problem, data), start, low, high)
     seconds = time.perf_counter() - clock
     assert solution.converged.all(), f"{(~solution.converged).sum()} fits did not converge"
-    return seconds, box.to_parameters(solution.u)
+    return seconds, problem.to_parameters(solution.u)
 
 
 def fit_scipy(data: list[Observations], stokes) -> tuple[float, np.ndarray]:

@@ -94,7 +94,7 @@ def fit_runs(
     space: Space, runs: list[Observations], starts: int, seed: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
     """Parameters and standard errors, shape (R, P), χ², shape (R,), and seconds."""
-    low, high = space.to_unknowns(space.lower), space.to_unknowns(space.upper)
+    low, high = space.box
     first = np.tile(sobol_starts(low, high, starts, seed), (len(runs), 1))
     clock = time.perf_counter()
     search = solve(residuals(space, runs, starts, accuracy="draft"), first, low, high, tolerance=1e-6)

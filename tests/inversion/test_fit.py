@@ -12,6 +12,7 @@ import pbrdf
 from pbrdf.errors import FitError
 from pbrdf.inversion.fit import compare
 from pbrdf.inversion.observations import Observations
+from pbrdf.inversion.problem import Space
 
 SHARED = Path(__file__).parents[3] / "shared" / "data"
 FREE = ("sigma", "n", "a", "k", "b", "t")
@@ -303,7 +304,10 @@ def test_compare_gives_the_dolp_of_unpolarised_and_polarised_data():
     model = pbrdf.load_paint("cd-back")
     angles = in_plane([30], [10.0, 40.0])
     only_I = pbrdf.make_dataset(*angles, quantity="brdf", I=[1.0, 1.0])
-    table = compare(model, Observations.from_dataset(only_I), only_I)
+    sigma, *others = model.parameters
+    value = np.array([model.values["sigma"]])
+    space = Space(type(model), {}, (sigma,), {p.name: model.values[p.name] for p in others}, value, value)
+    table = compare(space, space.to_unknowns(value), Observations.from_dataset(only_I), only_I)
     np.testing.assert_allclose(table["dolp_modelled"], pbrdf.dolp(model.stokes(*angles)))
     assert "dolp_measured" not in table
 

@@ -34,6 +34,10 @@ class PlainSpace:
 
     to_parameters = to_unknowns
 
+    @property
+    def box(self):
+        return self.lower, self.upper
+
 
 def design() -> np.ndarray:
     """30 measurements of three correlated unknowns, shape (30, 3)."""

@@ -106,7 +106,7 @@ def bootstrap(
     modelled = predict(space, result.unknowns, data, data.channels)
     truth = np.stack([modelled[name] for name in data.channels])
     sets = simulate(data, truth, count, np.random.default_rng(seed), scale)
-    low, high = space.to_unknowns(space.lower), space.to_unknowns(space.upper)
+    low, high = space.box
     start = np.tile(result.unknowns, (count, 1))
     solution = solve(residuals(space, sets, 1), start, low, high, progress=progress)
 

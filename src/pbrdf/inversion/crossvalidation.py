@@ -224,7 +224,7 @@ def _search(
     fold l // starts. The best end of each is refined with the model's own accuracy.
     """
     space = full.space
-    low, high = space.to_unknowns(space.lower), space.to_unknowns(space.upper)
+    low, high = space.box
     begin = np.concatenate([full.unknowns[None], space.to_unknowns(full.start_values)])[:starts]
     search = solve(
         residuals(space, data, starts, accuracy="draft"),
@@ -334,7 +334,7 @@ def _summarise(
     for k, (label, mask) in enumerate(zip(labels, held, strict=True)):
         unknowns = _with_labels_filled(space, solution.u[k], full.data, mask)
         found = np.clip(space.to_parameters(unknowns), space.lower, space.upper)
-        table = compare(space.build(found), full.data, dataset, (space, space.to_unknowns(found)))
+        table = compare(space, space.to_unknowns(found), full.data, dataset)
         for name in table.data_vars:
             if name in pooled:
                 pooled[name].values[mask] = table[name].values[mask]

@@ -313,7 +313,7 @@ def fit(
             f"{fitted_data.count} measured values cannot determine {len(space.free)} parameters: measure "
             "more, hold out less, or fix parameters"
         )
-    low, high = space.to_unknowns(space.lower), space.to_unknowns(space.upper)
+    low, high = space.box
     first = sobol_starts(low, high, starts, seed)
     first = first[np.argsort(first[:, 0])]  # neighbours alike: they then take the same branches
     _apply_starts(first, space, begin, start or {})
@@ -331,7 +331,7 @@ def fit(
     if not np.isfinite(solution.cost).any():
         raise FitError("no start gave finite residuals: check the data's values and the bounds")
     result = _summarise(
-        dataset, observations, fitted_data, held, space, solution, first, low, high, noise, hold_out, seconds
+        dataset, observations, fitted_data, held, space, solution, first, noise, hold_out, seconds
     )
     result.stages.extend(stages)
     if diffuse is not None:
@@ -525,8 +525,6 @@ def _summarise(
     space: Space,
     solution: Solution,
     first: np.ndarray,
-    low: np.ndarray,
-    high: np.ndarray,
     noise: Noise | None,
     hold_out: HoldOut | None,
     seconds: float,
@@ -537,7 +535,7 @@ def _summarise(
     values = space.to_parameters(solution.u[best])
     values = np.clip(values, space.lower, space.upper)
     model = space.build(values)
-    comparison = compare(model, observations, dataset, (space, space.to_unknowns(values)))
+    comparison = compare(space, space.to_unknowns(values), observations, dataset)
     comparison["held_out"] = ("geometry", held)
     near = comparison["facet_tilt"].values < near_specular_tilt(model)
     comparison["near_specular"] = ("geometry", near)
@@ -553,8 +551,8 @@ def _summarise(
         len(space.free),
         fitted_data.std_known,
     )
-    estimates, correlation = _estimates(space, values, solution, best, low, high, fitted_data, quality)
-    optima = _distinct_optima(space, solution, low, high)
+    estimates, correlation = _estimates(space, values, solution, best, fitted_data, quality)
+    optima = _distinct_optima(space, solution)
     regions = {"all": np.ones_like(held), "near-specular": near, "off-specular": ~near}
 
     def by_region(chosen: np.ndarray) -> dict[str, Prediction]:
@@ -596,22 +594,16 @@ def _summarise(
 
 
 def compare(
-    model: Model,
-    observations: Observations,
-    dataset: xr.Dataset,
-    fitted: tuple[Space, np.ndarray] | None = None,
+    space: Space, unknowns: np.ndarray, observations: Observations, dataset: xr.Dataset
 ) -> xr.Dataset:
     """Measured, modelled and residual values (model − measured) of every channel on the scale of a BRDF.
 
     Parameters
     ----------
-    model
-        The model.
+    space, unknowns
+        The model with its nuisance terms and split parameters; ``unknowns`` has the shape (P,).
     observations, dataset
         The same data in both forms.
-    fitted
-        Space and unknowns of a fit, whose nuisance terms and split parameters then count; without it the
-        model alone.
 
     Returns
     -------
@@ -622,11 +614,9 @@ def compare(
     """
     import xarray as xr
 
-    if fitted is None:
-        fitted = _trivial_space(model)
     elements = observations.channels[0].startswith("m")
     wanted = tuple(dict.fromkeys((*observations.channels, *(("m00", "m10", "m20") if elements else "IQU"))))
-    everything = predict(*fitted, observations, wanted)
+    everything = predict(space, unknowns, observations, wanted)
     if elements:
         everything |= {"I": everything["m00"], "Q": everything["m10"], "U": everything["m20"]}
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -667,25 +657,15 @@ def compare(
     return result
 
 
-def _trivial_space(model: Model) -> tuple[Space, np.ndarray]:
-    """A space in which only σ is free, at the model's own value."""
-    first, *others = model.parameters
-    value = np.array([float(model.values[first.name])])
-    fixed = {p.name: float(model.values[p.name]) for p in others}
-    space = Space(type(model), model.chosen, (first,), fixed, value, value)
-    return space, space.to_unknowns(value)
-
-
 def _estimates(
     space: Space,
     values: np.ndarray,
     solution: Solution,
     best: int,
-    low: np.ndarray,
-    high: np.ndarray,
     data: Observations,
     quality: Goodness,
 ) -> tuple[dict[str, Estimate], tuple[list[str], np.ndarray]]:
+    low, high = space.box
     u = solution.u[best]
     at_low = u <= low + 1e-9 * (high - low)
     at_high = u >= high - 1e-9 * (high - low)
@@ -726,7 +706,8 @@ def _estimates(
     return estimates, ([space.names[i] for i in inside], correlation)
 
 
-def _distinct_optima(space: Space, solution: Solution, low: np.ndarray, high: np.ndarray) -> list[Optimum]:
+def _distinct_optima(space: Space, solution: Solution) -> list[Optimum]:
+    low, high = space.box
     cost = np.where(solution.converged, solution.cost, np.inf)
     return [
         Optimum(

@@ -100,6 +100,11 @@ class Space:
                 result[..., i] = np.exp(result[..., i])
         return result
 
+    @property
+    def box(self) -> tuple[np.ndarray, np.ndarray]:
+        """Bounds of the solver's unknowns, shape (P,) each."""
+        return self.to_unknowns(self.lower), self.to_unknowns(self.upper)
+
     def derivative(self, values: np.ndarray) -> np.ndarray:
         """d parameter / d unknown at the parameters (..., P)."""
         result = np.ones_like(values)

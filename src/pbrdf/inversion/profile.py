@@ -428,7 +428,7 @@ class Optima:
     @classmethod
     def at(cls, space: Space, data: Sequence[Observations], u: np.ndarray, information: np.ndarray) -> Optima:
         """Optima of D data sets: unknowns of shape (D, P) and information of shape (D, P, P)."""
-        low, high = space.to_unknowns(space.lower), space.to_unknowns(space.upper)
+        low, high = space.box
         span = high - low
         at_bound = (u <= low + 1e-9 * span) | (u >= high - 1e-9 * span)
         linear = [

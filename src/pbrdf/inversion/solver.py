@@ -114,7 +114,7 @@ class Solution:
     u
         Unknowns, shape (B, P).
     cost
-        ½ Σ r², shape (B,).
+        What was minimised, ½ Σ ρ(r²) + ½ Σ penalty², shape (B,).
     information
         JᵀJ at ``u``, shape (B, P, P).
     gradient
@@ -349,12 +349,12 @@ def _iterate(
 
     # a step is small because the minimum is near only if damping has not made it so
     length = dr.zeros(type(cost), 1)
+    leaving = _leaving(g, u, low, high)
     slope2 = dr.zeros(type(cost), 1)  # largest squared cosine between the residuals and a column of J
     for i in range(size):
         length = dr.maximum(length, dr.abs(delta[i]) / dr.maximum(high[i] - low[i], 1e-300))
         cosine2 = g[i] * g[i] / dr.maximum(2.0 * A[i][i] * state.cost, 1e-300)
-        leaving = ((u[i] <= low[i]) & (g[i] > 0.0)) | ((u[i] >= high[i]) & (g[i] < 0.0))
-        slope2 = dr.maximum(slope2, dr.select(leaving, 0.0, cosine2))
+        slope2 = dr.maximum(slope2, dr.select(leaving[i], 0.0, cosine2))
     free = state.damping <= 1.0
     U = type(state.status)
     status = dr.select(state.damping > 1e12, U(int(Status.STALLED)), U(0))
@@ -456,6 +456,14 @@ def _unpack(packed: list[Any], size: int) -> list[list[Any]]:
     return rows
 
 
+def _leaving(g: list[Any], u: list[Any], low: list[Any], high: list[Any]) -> list[Any]:
+    """Which unknowns stand on a bound and would leave through it: they are held."""
+    return [
+        ((x <= a) & (slope > 0.0)) | ((x >= b) & (slope < 0.0))
+        for slope, x, a, b in zip(g, u, low, high, strict=True)
+    ]
+
+
 def _bounded_step(
     A: list[list[Any]], g: list[Any], damping: Any, u: list[Any], low: list[Any], high: list[Any]
 ) -> list[Any]:
@@ -463,8 +471,7 @@ def _bounded_step(
     import drjit as dr
 
     size = len(u)
-    # unknowns that stand on a bound and would leave through it are held
-    held = [((u[i] <= low[i]) & (g[i] > 0.0)) | ((u[i] >= high[i]) & (g[i] < 0.0)) for i in range(size)]
+    held = _leaving(g, u, low, high)
     known = [dr.zeros(type(u[0]), 1) for _ in range(size)]
     step = _damped_step(A, g, damping, held, known)
     for _ in range(BOUND_PASSES):

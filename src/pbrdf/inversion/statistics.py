@@ -17,7 +17,8 @@ class Goodness:
     Attributes
     ----------
     chi2
-        Σ ((model − measured)/std)².
+        Σ ((model − measured)/std)²: twice the minimised cost, so with a robust loss the sum of losses, and with
+        priors plus the squares of their deviations.
     data, free
         Numbers of measured values and of free parameters.
     reduced_chi2

@@ -87,7 +87,7 @@ def joint(
     solution, stages
         S lanes; and the one stage.
     """
-    low, high = space.to_unknowns(space.lower), space.to_unknowns(space.upper)
+    low, high = space.box
     search = solve(
         residuals(space, [data], len(first), accuracy="draft"),
         first,
@@ -145,7 +145,7 @@ def stepwise(
         )
     if not diffuse_free or not any(n in SPECULAR for n in names):
         raise FitError("stepwise: at least one of a, k, b, t and one of sigma, n, kappa must be free")
-    low, high = space.to_unknowns(space.lower), space.to_unknowns(space.upper)
+    low, high = space.box
     is_diffuse = np.array([n in DIFFUSE for n in names])
     tilt = facet_tilt(data.theta_i, data.theta_r, data.phi)
 
