@@ -35,6 +35,18 @@ def attributes():
     return st.tuples(free, texts).map(lambda both: both[0] | both[1])
 
 
+def covariances(draw, rows, channels):
+    """Covariances of any structure: some variances unknown, some covariances, and none beyond the channels."""
+    factors = draw(arrays(np.float64, (rows, 4, 4), elements=st.floats(-8, 8)))
+    full = factors @ factors.transpose(0, 2, 1) + np.eye(4)
+    full = 0.5 * (full + full.transpose(0, 2, 1))
+    known = draw(arrays(bool, (rows, 4))) & np.isin(list("IQUV"), channels)
+    full[~(known[:, :, None] & known[:, None, :])] = np.nan
+    alone = draw(arrays(bool, rows))
+    full[alone] = np.where(np.eye(4, dtype=bool), full[alone], np.nan)
+    return full
+
+
 @st.composite
 def datasets(draw):
     rows = draw(st.integers(1, 4))
@@ -50,6 +62,15 @@ def datasets(draw):
         channels[name] = draw(arrays(np.float64, shape, elements=elements))
         if draw(st.booleans()):
             std[name] = draw(arrays(np.float64, shape, elements=POSITIVE))
+    covariance = None
+    if form[-1] in "IQUV" and draw(st.booleans()):
+        covariance = covariances(draw, rows, form)
+        std = {}
+        if draw(st.booleans()):  # stated besides, and not to the last bit the roots of the variances
+            variance = np.einsum("gcc->cg", covariance)
+            unknown = draw(arrays(np.float64, rows, elements=POSITIVE))
+            stated = np.where(np.isnan(variance), unknown, np.sqrt(variance * (1 + 1e-9)))
+            std = {name: stated["IQUV".index(name)] for name in form}
     numbers = st.integers(-(2**63), 2**63 - 1)
     text = st.text(min_size=1).filter(lambda t: t == t.strip() and t.isprintable())
     labels = st.lists(numbers, min_size=rows, max_size=rows) | st.lists(text, min_size=rows, max_size=rows)
@@ -59,6 +80,7 @@ def datasets(draw):
         column(azimuths()),
         quantity=draw(st.sampled_from(["brdf", "reflectance_factor", "radiance", "dn"])),
         std=std,
+        covariance=covariance,
         wavelength=column(POSITIVE) if draw(st.booleans()) else None,
         group=draw(st.none() | labels),
         illumination=draw(st.sampled_from([(1, 0, 0, 0), (1, 0.6, -0.3, 0.1)])),

@@ -9,11 +9,14 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
+from pbrdf.data.covariance import complete_covariance
 from pbrdf.data.schema import (
+    COVARIANCE,
     DIMENSION,
     NATURAL_LIGHT,
     QUANTITIES,
     STOKES,
+    STOKES_AXES,
     VARIABLES,
     spells_integer,
     std_name,
@@ -40,6 +43,7 @@ def make_dataset(
     aolp: ArrayLike | None = None,
     mueller: ArrayLike | None = None,
     std: Mapping[str, ArrayLike] | None = None,
+    covariance: ArrayLike | None = None,
     wavelength: ArrayLike | None = None,
     group: ArrayLike | None = None,
     illumination: Sequence[float] = NATURAL_LIGHT,
@@ -64,6 +68,10 @@ def make_dataset(
     std
         Standard uncertainties by the name of the variable they belong to, in that variable's unit and
         shape (or broadcast to it).
+    covariance
+        Of the errors of I, Q, U, V (these four in this order, NaN for what was not measured or is not known),
+        shape (N, 4, 4), or (4, 4) for all rows, in the square of the data's unit. It fills the standard
+        uncertainties that `std` does not state; those that it states must agree with the diagonal.
     wavelength
         Nanometres, shape (N,) or a scalar; None leaves the coordinate out.
     group
@@ -105,6 +113,7 @@ def make_dataset(
             "simulated": int(simulated),
             **(attrs or {}),
         },
+        covariance,
     )
     validate(ds)
     return ds
@@ -115,6 +124,7 @@ def assemble(
     channels: Mapping[str, ArrayLike],
     std: Mapping[str, ArrayLike],
     attrs: Mapping[str, Any],
+    covariance: ArrayLike | None = None,
 ) -> xr.Dataset:
     """Put arrays into the form of the schema without judging their values (readers do that later)."""
     quantity = attrs["quantity"]
@@ -127,7 +137,9 @@ def assemble(
     if orphans:
         raise DataError(f"there is an uncertainty of {orphans[0]} but no {orphans[0]}")
 
-    rows = _row_count({**coordinates, **channels})
+    rows = _row_count({**coordinates, **channels, COVARIANCE: covariance})
+    if covariance is not None:
+        covariance, std = complete_covariance(covariance, rows, std, channels)
     coords: dict[str, Any] = {}
     for name, value in coordinates.items():
         if name == "group":
@@ -146,8 +158,11 @@ def assemble(
         shape = (rows,) if len(dims) == 1 else (rows, 4, 4)
         array = _broadcast(name, _floats(name, value), shape)
         data[name] = (dims, array, {"units": variable_units(name, quantity)})
-    if "mueller" in data:
-        coords |= {"stokes_out": list(STOKES), "stokes_in": list(STOKES)}
+    if covariance is not None:
+        units = {"units": variable_units(COVARIANCE, quantity)}
+        data[COVARIANCE] = (variable_dims(COVARIANCE), covariance, units)
+    used = {dim for dims, *_ in data.values() for dim in dims}
+    coords |= {axis: list(STOKES) for axis in STOKES_AXES if axis in used}
     return xr.Dataset(data, coords, {"stokes_convention": "p-s", **attrs})
 
 
@@ -183,7 +198,7 @@ def _row_count(arrays: Mapping[str, ArrayLike | None]) -> int:
     lengths = set()
     for name, value in arrays.items():
         shape = np.shape(value) if value is not None else ()
-        if len(shape) == (3 if name == "mueller" else 1):
+        if len(shape) == (3 if name in ("mueller", COVARIANCE) else 1):
             lengths.add(shape[0])
     return max(lengths - {1}, default=1)
 

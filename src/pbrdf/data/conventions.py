@@ -19,6 +19,8 @@ __all__ = [
     "azimuth_forward_pi_to_zero",
     "azimuth_forward_zero_to_pi",
     "brdf_to_reflectance_factor",
+    "covariance_flip_v",
+    "covariance_swap_sp",
     "dolp_aolp_from_stokes",
     "mueller_flip_v",
     "mueller_from_scatmech",
@@ -94,6 +96,19 @@ def stokes_flip_v(stokes: ArrayLike) -> NDArray[np.float64]:
 def mueller_flip_v(mueller: ArrayLike) -> NDArray[np.float64]:
     """Mueller matrices with the other handedness counted as V > 0, on both sides."""
     return np.asarray(mueller, dtype=np.float64) * np.outer(_FLIP_V, _FLIP_V)
+
+
+def covariance_swap_sp(covariance: ArrayLike) -> NDArray[np.float64]:
+    """Covariances of Stokes vectors from Q = I_s − I_p to Q = I_p − I_s, or back: see :func:`stokes_swap_sp`.
+
+    The vector is multiplied with D = diag(1, −1, −1, 1), so its covariance C, shape (..., 4, 4), becomes D C Dᵀ.
+    """
+    return np.asarray(covariance, dtype=np.float64) * np.outer(_SWAP_SP, _SWAP_SP)
+
+
+def covariance_flip_v(covariance: ArrayLike) -> NDArray[np.float64]:
+    """Covariances of Stokes vectors, shape (..., 4, 4), with the other handedness counted as V > 0."""
+    return np.asarray(covariance, dtype=np.float64) * np.outer(_FLIP_V, _FLIP_V)
 
 
 def mueller_from_scatmech(mueller: ArrayLike) -> NDArray[np.float64]:

@@ -7,14 +7,21 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from pbrdf.data.schema import VARIABLES, std_name
+from pbrdf.data.schema import STOKES, VARIABLES, std_name
 from pbrdf.errors import DataError
 
-__all__ = ["ANGLE_COLUMNS", "CHANNELS", "ELEMENTS", "Column", "resolve_columns"]
+__all__ = ["ANGLE_COLUMNS", "CHANNELS", "COVARIANCES", "ELEMENTS", "Column", "resolve_columns"]
 
 ELEMENTS = tuple(f"m{i}{j}" for i in range(4) for j in range(4))
 CHANNELS = (*(name for name in VARIABLES if name != "mueller"), *ELEMENTS)
-_COLUMNS = ("theta_i", "theta_r", "phi", "wavelength", "group", *CHANNELS, *map(std_name, CHANNELS))
+#: Columns of the covariance by the position of their entry, the upper triangle with the diagonal.
+COVARIANCES = {(i, j): f"cov_{STOKES[i]}{STOKES[j]}" for i in range(4) for j in range(i, 4)}
+_COLUMNS = (
+    *("theta_i", "theta_r", "phi", "wavelength", "group"),
+    *CHANNELS,
+    *map(std_name, CHANNELS),
+    *COVARIANCES.values(),
+)
 ANGLE_COLUMNS = ("theta_i", "theta_r", "phi", "aolp", "aolp_std")
 
 # Keys are lower case without separators. A name that could mean two things is not here: DoP is not DoLP,
@@ -34,6 +41,9 @@ _SYNONYMS = {
 }
 _VARIABLE_OF = {name.lower().replace("_", ""): name for name in _COLUMNS}
 _VARIABLE_OF |= {synonym: name for name, synonyms in _SYNONYMS.items() for synonym in synonyms.split()}
+# A covariance may name its two components in either order.
+_VARIABLE_OF |= {f"cov{STOKES[j]}{STOKES[i]}".lower(): name for (i, j), name in COVARIANCES.items()}
+_VARIABLE_OF |= {f"covs{a}s{b}": name for (i, j), name in COVARIANCES.items() for a, b in ((i, j), (j, i))}
 _QUANTITY_OF = {
     "brdf": "brdf",
     "fr": "brdf",
@@ -55,7 +65,8 @@ class Column:
     Attributes
     ----------
     variable
-        One of theta_i, theta_r, phi, wavelength, group, the channels, m00 … m33, or a channel with _std.
+        One of theta_i, theta_r, phi, wavelength, group, the channels, m00 … m33, a channel with _std, or
+        cov_II … cov_VV.
     index
         Position in the file, from 0; None for a constant.
     constant
@@ -157,9 +168,11 @@ def resolve_columns(
 
 def _mapped_column(path: Path, names: Sequence[str], variable: str, name: str) -> Column:
     if variable not in _COLUMNS:
-        plain = ", ".join(name for name in _COLUMNS if name not in ELEMENTS and not name.endswith("_std"))
+        many = (*ELEMENTS, *COVARIANCES.values())
+        plain = ", ".join(name for name in _COLUMNS if name not in many and not name.endswith("_std"))
         raise DataError(
-            f"{path}: no column is called {variable!r} here; use {plain}, m00 … m33, or a channel with _std"
+            f"{path}: no column is called {variable!r} here; use {plain}, m00 … m33, a channel with _std, or "
+            "cov_IQ … cov_UV"
         )
     if name.startswith("="):
         return Column(variable, None, constant=name[1:].strip())

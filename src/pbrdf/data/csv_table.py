@@ -31,11 +31,16 @@ key                 values                                            if it is n
 about polarisation and azimuth is recorded in the attribute ``assumptions``.
 
 **Columns.** ``theta_i``, ``theta_r``, ``phi``, ``wavelength``, ``group``, ``I``, ``Q``, ``U``, ``V``,
-``dolp``, ``aolp``, ``m00`` … ``m33``, and ``<name>_std``; case, spaces, hyphens and underscores do not
-matter, and some usual synonyms are understood (``incidence``, ``zenith_i``, ``lambda``, ``s0`` … ``s3``).
+``dolp``, ``aolp``, ``m00`` … ``m33``, ``<name>_std``, and the covariances ``cov_IQ``, ``cov_IU``,
+``cov_IV``, ``cov_QU``, ``cov_QV``, ``cov_UV``; case, spaces, hyphens and underscores do not matter, and some
+usual synonyms are understood (``incidence``, ``zenith_i``, ``lambda``, ``s0`` … ``s3``).
 A unit in the name, ``_deg``, ``_rad``, ``_nm``, ``_um`` or ``[deg]``, counts before the header's. Other
 columns are left out and listed in the attribute ``ignored_columns``. Empty cells, ``nan`` and ``NA`` are
 NaN. Columns are separated by commas, semicolons or tabs; with the last two, decimal commas are read.
+
+**Covariances.** Where there is any column of them, the variances are the squares of ``<name>_std``, or, where
+there is one, the column ``cov_II``, ``cov_QQ``, ``cov_UU`` or ``cov_VV``; such a column also serves in place of
+``<name>_std``.
 
 **No azimuth column** means a measurement in the plane of incidence. Then ``theta_i`` must not be negative,
 ``theta_r`` ≥ 0 is on the side of the specular direction (φ = 0), and ``theta_r`` < 0 on the side of the
@@ -57,12 +62,15 @@ from numpy.typing import NDArray
 
 from pbrdf.data import conventions
 from pbrdf.data.build import assemble, group_labels
-from pbrdf.data.csv_columns import ANGLE_COLUMNS, CHANNELS, ELEMENTS, Column, resolve_columns
+from pbrdf.data.covariance import derived_variance, square
+from pbrdf.data.csv_columns import ANGLE_COLUMNS, CHANNELS, COVARIANCES, ELEMENTS, Column, resolve_columns
 from pbrdf.data.schema import (
     ATTRIBUTE_NAME,
+    COVARIANCE,
     FILE_KEYS,
     NATURAL_LIGHT,
     QUANTITIES,
+    STOKES,
     TEXT_ATTRIBUTES,
     VARIABLES,
     std_name,
@@ -386,17 +394,26 @@ def _to_dataset(
     channels = {name: values[name] for name in CHANNELS if name in values}
     std = {name: values[std_name(name)] for name in CHANNELS if std_name(name) in values}
     channels, std = _gather_mueller(channels), _gather_mueller(std)
+    covariance = _gather_covariance(values)
     if "stokes" in header.unstated and channels.keys() & {"Q", "U", "aolp", "mueller"}:
         assumptions.append("the file does not say what Q > 0 means; Q = I_p - I_s was assumed")
     illumination = header.illumination
     if not header.p_minus_s:
         illumination = conventions.stokes_swap_sp(illumination).tolist()
         channels = _swap_sp(channels)
+        covariance = None if covariance is None else conventions.covariance_swap_sp(covariance)
     if header.cosine_weighted:
         for part in (channels, std):
             for name in part.keys() - {"dolp", "aolp"}:
                 part[name] = conventions.remove_cosine_weight(part[name], values["theta_r"])
+        if covariance is not None:
+            for _ in range(2):
+                covariance = conventions.remove_cosine_weight(covariance, values["theta_r"])
 
+    if covariance is not None:
+        for i, name in enumerate(STOKES):
+            if COVARIANCES[i, i] not in values and name in std:
+                covariance[:, i, i] = square(std[name])
     extra: dict[str, Any] = {"ignored_columns": ignored} if ignored else {}
     if assumptions:
         extra["assumptions"] = assumptions
@@ -408,7 +425,7 @@ def _to_dataset(
         **extra,
     }
     try:
-        return assemble(coordinates, channels, std, attrs)
+        return assemble(coordinates, channels, std, attrs, covariance)
     except DataError as error:
         raise DataError(f"{table.path}: {error}") from None
 
@@ -442,6 +459,17 @@ def _gather_mueller(values: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
         stacked = np.stack([elements.get(name, missing) for name in ELEMENTS], axis=-1)
         rest["mueller"] = stacked.reshape(-1, 4, 4)
     return rest
+
+
+def _gather_covariance(values: Mapping[str, NDArray[Any]]) -> NDArray[np.float64] | None:
+    """The covariance, shape (N, 4, 4), from its columns, NaN where there is none; None without any."""
+    if not values.keys() & set(COVARIANCES.values()):
+        return None
+    matrix = np.full((len(values["theta_i"]), 4, 4), np.nan)
+    for (i, j), name in COVARIANCES.items():
+        if name in values:
+            matrix[:, i, j] = matrix[:, j, i] = values[name]
+    return matrix
 
 
 def _swap_sp(channels: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
@@ -521,6 +549,23 @@ def _text_columns(ds: xr.Dataset) -> Iterator[tuple[str, list[str]]]:
                     yield element + name.removeprefix("mueller"), _text(flat[:, position])
             else:
                 yield name, _text(ds[name].values)
+    if COVARIANCE in ds.data_vars:
+        for i, j in _covariances_written(ds):
+            yield COVARIANCES[i, j], _text(ds[COVARIANCE].values[:, i, j])
+
+
+def _covariances_written(ds: xr.Dataset) -> list[tuple[int, int]]:
+    """Entries that a file needs: those between what was measured, and variances other than exactly std²."""
+    matrix = ds[COVARIANCE].values
+    written = []
+    for i, j in COVARIANCES:
+        if i == j:
+            needed = not np.array_equal(matrix[:, i, i], derived_variance(ds, STOKES[i]), equal_nan=True)
+        else:
+            needed = STOKES[i] in ds.data_vars and STOKES[j] in ds.data_vars
+        if needed:
+            written.append((i, j))
+    return written or [(0, 0)]
 
 
 def _text_angle(ds: xr.Dataset, name: str) -> tuple[str, list[str]]:

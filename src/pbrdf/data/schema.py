@@ -25,6 +25,13 @@ Data variables: exactly one of three forms
     Each may have a standard uncertainty of the same shape in the variable ``<name>_std``, > 0. NaN means
     *not measured here*, and, in an uncertainty, *not known*.
 
+    Beside form (a) there may be ``covariance``, that of the errors of I, Q, U, V at each geometry, with the
+    dimensions (``geometry``, ``stokes_row``, ``stokes_column``), whose coordinates are I, Q, U, V, in the
+    square of the data's unit. It is symmetric and positive semidefinite; its diagonal is the square of the
+    standard uncertainties, to a relative 1e-6. NaN off the diagonal: not known, counts as independent. NaN
+    on the diagonal (then in the whole row and column): ``<name>_std``, if there is one, stands by itself.
+    A component without a data variable has none.
+
 Attributes
     ``quantity``
         ``"brdf"`` (1/sr), ``"reflectance_factor"`` (π · BRDF, 1), ``"radiance"`` (arbitrary units,
@@ -55,12 +62,14 @@ __all__ = [
     "ANGLES",
     "ATTRIBUTE_NAME",
     "COORDINATES",
+    "COVARIANCE",
     "DIMENSION",
     "FILE_KEYS",
     "FORMS",
     "NATURAL_LIGHT",
     "QUANTITIES",
     "STOKES",
+    "STOKES_AXES",
     "TEXT_ATTRIBUTES",
     "UNITS",
     "VARIABLES",
@@ -77,6 +86,11 @@ NATURAL_LIGHT = (1.0, 0.0, 0.0, 0.0)
 QUANTITIES = ("brdf", "reflectance_factor", "radiance", "dn")
 COORDINATES = ("theta_i", "theta_r", "phi", "wavelength", "group")
 VARIABLES = ("I", "Q", "U", "V", "dolp", "aolp", "mueller")
+
+#: The variable that holds the covariance of the Stokes components.
+COVARIANCE = "covariance"
+#: Coordinates that count Stokes components: of Mueller matrices, then of covariances.
+STOKES_AXES = ("stokes_out", "stokes_in", "stokes_row", "stokes_column")
 
 #: The three forms of a data set: the variable that makes the form, and those that may stand beside it.
 FORMS = (("I", ("Q", "U", "V")), ("dolp", ("I", "aolp")), ("mueller", ()))
@@ -101,9 +115,11 @@ def std_name(variable: str) -> str:
 
 
 def variable_dims(variable: str) -> tuple[str, ...]:
-    """Dimensions of a data variable or of its uncertainty."""
+    """Dimensions of a data variable, of its uncertainty or of the covariance."""
     if variable in ("mueller", "mueller_std"):
-        return (DIMENSION, "stokes_out", "stokes_in")
+        return (DIMENSION, *STOKES_AXES[:2])
+    if variable == COVARIANCE:
+        return (DIMENSION, *STOKES_AXES[2:])
     return (DIMENSION,)
 
 
@@ -118,7 +134,8 @@ def variable_units(variable: str, quantity: str) -> str:
         return "1"
     if base == "group":
         return ""
-    return UNITS.get(quantity, "")
+    unit = UNITS.get(quantity, "")
+    return "1/sr2" if variable == COVARIANCE and unit == "1/sr" else unit
 
 
 def spells_integer(label: str) -> bool:

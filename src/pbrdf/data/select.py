@@ -9,7 +9,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from pbrdf.data.conventions import reflectance_factor_to_brdf, remove_cosine_weight
-from pbrdf.data.schema import UNITS, VARIABLES, std_name
+from pbrdf.data.covariance import derived_variance
+from pbrdf.data.schema import COVARIANCE, STOKES, VARIABLES, std_name, variable_units
 from pbrdf.errors import DataError
 
 __all__ = ["match_wavelengths", "measured_channels", "to_brdf_scale"]
@@ -26,7 +27,7 @@ def measured_channels(ds: xr.Dataset) -> tuple[str, ...]:
 
 
 def to_brdf_scale(ds: xr.Dataset) -> xr.Dataset:
-    """The same data as a BRDF, uncertainties included.
+    """The same data as a BRDF, uncertainties and covariances included.
 
     A reflectance factor is divided by π, radiance and digital numbers by cos θ_i. The unknown factor of the
     last two stays in the values, which the attribute ``scale = "arbitrary"`` records. Degree and angle of
@@ -46,16 +47,26 @@ def to_brdf_scale(ds: xr.Dataset) -> xr.Dataset:
     result = ds.copy(deep=True)
     if quantity == "brdf":
         return result
-    for channel in ("I", "Q", "U", "V", "mueller"):
+
+    def scaled(values: NDArray[np.float64]) -> NDArray[np.float64]:
+        if quantity == "reflectance_factor":
+            return reflectance_factor_to_brdf(values)
+        return remove_cosine_weight(values, ds["theta_i"].values)
+
+    def put(name: str, values: NDArray[np.float64]) -> None:
+        result[name] = (ds[name].dims, values, {**ds[name].attrs, "units": variable_units(name, "brdf")})
+
+    for channel in (*STOKES, "mueller"):
         for name in (channel, std_name(channel)):
-            if name not in ds.data_vars:
-                continue
-            values = ds[name].values
-            if quantity == "reflectance_factor":
-                scaled = reflectance_factor_to_brdf(values)
-            else:
-                scaled = remove_cosine_weight(values, ds["theta_i"].values)
-            result[name] = (ds[name].dims, scaled, {**ds[name].attrs, "units": UNITS["brdf"]})
+            if name in ds.data_vars:
+                put(name, scaled(ds[name].values))
+    if COVARIANCE in ds.data_vars:
+        covariance = scaled(scaled(ds[COVARIANCE].values))
+        for i, channel in enumerate(STOKES):
+            # once more the exact square of the standard uncertainty, which rounding made it miss
+            known = np.isfinite(covariance[:, i, i])
+            covariance[known, i, i] = derived_variance(result, channel)[known]
+        put(COVARIANCE, covariance)
     result.attrs["quantity"] = "brdf"
     if quantity in ("radiance", "dn"):
         result.attrs["scale"] = "arbitrary"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import secrets
+import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,6 +18,7 @@ from pbrdf.data.schema import TEXT_ATTRIBUTES
 from pbrdf.errors import DataError
 
 __all__ = [
+    "atomic_folder",
     "atomic_target",
     "decode_attribute",
     "encode_attribute",
@@ -65,6 +67,31 @@ def atomic_target(path: Path) -> Iterator[Path]:
         raise DataError(f"{path}: cannot be written: {error.strerror or error}") from error
     finally:
         beside.unlink(missing_ok=True)
+
+
+@contextmanager
+def atomic_folder(path: Path) -> Iterator[Path]:
+    """As :func:`atomic_target` for a folder: that of `path`, if there is one, is replaced as a whole.
+
+    Raises
+    ------
+    DataError
+        If the folder cannot be written.
+    """
+    resolved = path.resolve()
+    beside, old = (resolved.with_name(f".{resolved.name}.{secrets.token_hex(4)}.tmp") for _ in range(2))
+    try:
+        yield beside
+        if resolved.exists():
+            resolved.replace(old)
+        beside.replace(resolved)
+    except OSError as error:
+        if old.exists() and not resolved.exists():
+            old.replace(resolved)
+        raise DataError(f"{path}: cannot be written: {error.strerror or error}") from error
+    finally:
+        shutil.rmtree(beside, ignore_errors=True)
+        shutil.rmtree(old, ignore_errors=True)
 
 
 def exact_degrees(radians: NDArray[np.float64]) -> NDArray[np.float64] | None:

@@ -18,14 +18,17 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from pbrdf.data.covariance import covariance_problems
 from pbrdf.data.schema import (
     ATTRIBUTE_NAME,
     COORDINATES,
+    COVARIANCE,
     DIMENSION,
     FILE_KEYS,
     FORMS,
     QUANTITIES,
     STOKES,
+    STOKES_AXES,
     TEXT_ATTRIBUTES,
     VARIABLES,
     spells_integer,
@@ -38,6 +41,8 @@ __all__ = ["Issue", "check", "validate"]
 
 #: How many standard uncertainties an unphysical value may stray before it is reported.
 TOLERATED_DEVIATIONS = 5.0
+#: Single precision rounds a degree of polarisation of 1 to a little more.
+_ROUNDING = 1e-6
 
 _ROWS_NAMED = 5
 _LOWER_CASE_ATTRIBUTES = frozenset(
@@ -113,6 +118,8 @@ def check(
     # Values can only be judged where the arrays have the right shape and type.
     if not any(issue.severity == "error" for issue in issues):
         issues += [*_angles(ds, labels), *_groups(ds, labels), *_values(ds, labels), *_physics(ds, labels)]
+        if COVARIANCE in ds.data_vars:
+            issues += _covariance(ds, labels)
     return sorted(issues, key=lambda issue: issue.severity != "error")
 
 
@@ -229,18 +236,18 @@ def _structure(ds: xr.Dataset) -> Iterator[Issue]:
     for name in ("theta_i", "theta_r", "phi", "group"):
         if name not in ds.coords:
             yield _error(name, f"the coordinate {name} is missing")
-    known = {*COORDINATES, *VARIABLES, *map(std_name, VARIABLES), "stokes_out", "stokes_in"}
+    known = {*COORDINATES, *VARIABLES, *map(std_name, VARIABLES), COVARIANCE, *STOKES_AXES}
     for name in map(str, ds.variables):
         if name not in known:
             yield _error(
                 name,
                 f"the schema has no variable {name!r}; drop it, or use one of "
-                f"{', '.join((*COORDINATES, *VARIABLES))}",
+                f"{', '.join((*COORDINATES, *VARIABLES, COVARIANCE))}",
             )
         elif name in COORDINATES and name not in ds.coords:
             yield _error(name, f"{name} must be a coordinate, not a data variable")
     for name in map(str, ds.variables):
-        if name in ("stokes_out", "stokes_in"):
+        if name in STOKES_AXES:
             if ds[name].values.tolist() != list(STOKES):
                 yield _error(name, f"the coordinate {name} must be {', '.join(STOKES)} in this order")
         elif name in known:
@@ -274,6 +281,9 @@ def _forms(ds: xr.Dataset) -> Iterator[Issue]:
         )
     elif "dolp" in present and "I" not in present:
         yield _error("I", "dolp needs I beside it; fill I with NaN if it was not measured")
+    elif COVARIANCE in ds.data_vars and not set(present) <= set(STOKES):
+        other = next(name for name in present if name not in STOKES)
+        yield _error(COVARIANCE, f"the covariance is that of I, Q, U, V and cannot stand beside {other}")
 
 
 def _angles(ds: xr.Dataset, labels: _Labels) -> Iterator[Issue]:
@@ -348,7 +358,7 @@ def _values(ds: xr.Dataset, labels: _Labels) -> Iterator[Issue]:
             )
         if name in VARIABLES:
             measured |= np.any(~np.isnan(values), axis=1)
-        else:
+        elif name != COVARIANCE:
             bad = np.flatnonzero(np.any(values <= 0, axis=1))
             if bad.size:
                 what = "a wavelength" if name == "wavelength" else "a standard uncertainty"
@@ -362,6 +372,11 @@ def _values(ds: xr.Dataset, labels: _Labels) -> Iterator[Issue]:
     empty = np.flatnonzero(~measured)
     if empty.size:
         yield _warning("", f"{labels.rows(empty)}: nothing was measured there; drop the row", empty)
+
+
+def _covariance(ds: xr.Dataset, labels: _Labels) -> Iterator[Issue]:
+    for words, bad in covariance_problems(ds):
+        yield _error(COVARIANCE, f"{COVARIANCE}, {labels.rows(bad)}: {words}", bad)
 
 
 def _physics(ds: xr.Dataset, labels: _Labels) -> Iterator[Issue]:
@@ -389,7 +404,7 @@ def _physics(ds: xr.Dataset, labels: _Labels) -> Iterator[Issue]:
     # Values of any size may meet here; what overflows or divides by zero compares as not excessive.
     with np.errstate(all="ignore"):
         ratio, deviation = _largest_element(ds) if mueller else _degree_of_polarization(ds)
-        bad = np.flatnonzero((ratio - TOLERATED_DEVIATIONS * deviation > 1) & (intensity > 0))
+        bad = np.flatnonzero((ratio - TOLERATED_DEVIATIONS * deviation > 1 + _ROUNDING) & (intensity > 0))
     if bad.size:
         what = "largest |m_ij|/m00" if mueller else "degree of polarisation"
         yield _warning(

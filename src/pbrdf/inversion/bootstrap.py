@@ -69,8 +69,8 @@ def bootstrap(
 ) -> Bootstrap:
     """Fit simulated data sets, all in one batch, from the optimum of a fit.
 
-    The data sets are the best model plus independent normal errors of the data's standard uncertainties; where
-    these are a guess, multiplied with the root of the reduced χ². They answer how much random errors of that size
+    The data sets are the best model plus normal errors of the data's standard uncertainties and correlations; where
+    the former are a guess, multiplied with the root of the reduced χ². They answer how much random errors of that size
     move the parameters if the model is true. Starting from the optimum, they do not show other optima.
 
     Parameters
@@ -168,7 +168,7 @@ def simulate(
     Parameters
     ----------
     data
-        Geometries, channels and standard uncertainties; where nothing was measured, nothing is simulated.
+        Geometries, channels, standard uncertainties and correlations; where nothing was measured, nothing is simulated.
     values
         True values, shape (C, G).
     count
@@ -181,4 +181,9 @@ def simulate(
     measured = np.isfinite(data.std)
     std = scale * np.where(measured, data.std, 0.0)
     truth = np.where(measured, values, 0.0)
-    return [replace(data, values=truth + std * rng.standard_normal(std.shape)) for _ in range(count)]
+
+    def errors() -> np.ndarray:
+        drawn = rng.standard_normal(std.shape)
+        return std * (drawn if data.correlation is None else np.einsum("gij,jg->ig", data.factor, drawn))
+
+    return [replace(data, values=truth + errors()) for _ in range(count)]

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pbrdf.data.schema import COVARIANCE
 from pbrdf.data.validate import validate
 from pbrdf.errors import FitError
 from pbrdf.inversion.clusters import cluster
@@ -262,11 +263,11 @@ def fit(
         Number of starts, spread over the bounds by a Sobol sequence.
     noise
         Stated noise, an object of :mod:`pbrdf.inversion.noise` or its text like ``"0.02,0.01"``, ``"equal"`` or
-        ``"instrument:linear=1%,quantum=1"``; None takes the uncertainties of the data set and, where it has
-        none, the default of :class:`NoiseModel`.
+        ``"instrument:linear=1%,quantum=1"``, which replaces uncertainties and covariances of the data set; None takes
+        these and, where it has none, the default of :class:`NoiseModel`.
     covariance
         Full covariance of the measured Stokes components at each geometry, shape (G, C, C) in the order I, Q, U,
-        V, on the data's own scale; it replaces all standard uncertainties.
+        V, on the data's own scale; it replaces all other statements of noise.
     objective
         ``"stokes"``: signed Stokes components (or whatever was measured); ``"paper"``: intensity and DoLP with
         equal weights, as the paper does.
@@ -301,9 +302,11 @@ def fit(
         raise FitError(f"loss={loss!r}: choose one of {', '.join(LOSSES)}")
     if objective not in OBJECTIVES:
         raise FitError(f"objective={objective!r}: choose one of {', '.join(OBJECTIVES)}")
-    observations = Observations.from_dataset(dataset, noise, objective)
-    if covariance is not None:
-        observations = observations.with_covariance(np.asarray(covariance))
+    if covariance is None:
+        observations = Observations.from_dataset(dataset, noise, objective)
+    else:
+        bare = Observations.from_dataset(dataset.drop_vars(COVARIANCE, errors="ignore"), None, objective)
+        observations = bare.with_covariance(np.asarray(covariance))
     held = hold_out.mask(dataset, seed) if hold_out else np.zeros(observations.values.shape[1], dtype=bool)
     fitted_data = observations.subset(~held)
     space, begin = _space(model, options or {}, fix or {}, free, bounds or {}, start or {}, fitted_data)
@@ -330,8 +333,11 @@ def fit(
     seconds = time.perf_counter() - clock
     if not np.isfinite(solution.cost).any():
         raise FitError("no start gave finite residuals: check the data's values and the bounds")
+    words = _noise_in_words(noise, fitted_data)
+    if covariance is not None:
+        words = "stated: the covariance of the components"
     result = _summarise(
-        dataset, observations, fitted_data, held, space, solution, first, noise, hold_out, seconds
+        dataset, observations, fitted_data, held, space, solution, first, words, hold_out, seconds
     )
     result.stages.extend(stages)
     if diffuse is not None:
@@ -525,7 +531,7 @@ def _summarise(
     space: Space,
     solution: Solution,
     first: np.ndarray,
-    noise: Noise | None,
+    noise: str,
     hold_out: HoldOut | None,
     seconds: float,
 ) -> FitResult:
@@ -577,7 +583,7 @@ def _summarise(
         comparison=comparison,
         fitted=by_region(~held),
         predicted=by_region(held) if held.any() else {},
-        noise=_noise_in_words(noise, fitted_data),
+        noise=noise,
         std_known=fitted_data.std_known,
         hold_out=hold_out,
         space=space,
@@ -723,7 +729,8 @@ def _noise_in_words(noise: Noise | None, data: Observations) -> str:
     if noise is not None:
         return f"stated: {noise}"
     if data.std_known:
-        return "standard uncertainties of the data set"
+        kind = "standard uncertainties" if data.correlation is None else "covariances"
+        return f"{kind} of the data set"
     return f"assumed, as the data set states no (or not every) uncertainty: {NoiseModel()}"
 
 

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from pbrdf.data.conventions import qu_from_dolp_aolp
+from pbrdf.data.covariance import correlations
+from pbrdf.data.schema import COVARIANCE, STOKES
 from pbrdf.data.select import measured_channels, to_brdf_scale
 from pbrdf.errors import FitError
 from pbrdf.inversion.noise import Noise, NoiseModel
@@ -17,7 +20,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Observations"]
 
-_STOKES = ("I", "Q", "U", "V")
+#: Correlation matrices whose smallest eigenvalue is no more than this are singular but for rounding.
+SINGULAR = 1e-12
 
 
 @dataclass(frozen=True)
@@ -37,13 +41,13 @@ class Observations:
         Stokes vector of the source.
     std_known
         Whether every standard uncertainty comes from the data set; if not, their scale is a guess.
-    whitening
-        Lower triangular factors W with WᵀW the inverse covariance of the channels at a geometry, shape
-        (C, C, G); None where the channels are independent and 1/std serves.
     group, wavelength
         Labels and wavelengths (nm) of the geometries, shape (G,); None where there are none.
     scale
         Factor that brought the data to the scale of a BRDF, shape (G,); None for 1.
+    correlation
+        Correlation matrix of the errors of the channels at each geometry, shape (G, C, C); None where they are
+        independent. Only entries between measured channels count.
     """
 
     theta_i: np.ndarray
@@ -57,7 +61,7 @@ class Observations:
     group: np.ndarray | None = None
     wavelength: np.ndarray | None = None
     scale: np.ndarray | None = None
-    whitening: np.ndarray | None = None
+    correlation: np.ndarray | None = None
 
     @classmethod
     def from_dataset(
@@ -66,22 +70,24 @@ class Observations:
         """Take what was measured from a valid data set.
 
         DoLP with AoLP becomes Q and U (their uncertainties propagated); DoLP alone is compared as it is.
-        Uncertainties of the data set are used where given unless ``noise`` states others.
+        Uncertainties and covariances of the data set are used where given unless ``noise`` states others.
 
         Parameters
         ----------
         ds
             Data set of the project's schema, see :mod:`pbrdf.data.schema`.
         noise
-            Stated noise; None takes the data set's uncertainties and :class:`NoiseModel` where there are none.
+            Stated noise, independent between the channels; None takes the data set's uncertainties and covariances,
+            and :class:`NoiseModel` where there are none.
         objective
             ``"stokes"``: signed components as measured; ``"paper"``: intensity and DoLP with equal weights, each in
-            units of its root mean square (Zhang et al. 2017 say no more than "equal weights").
+            units of its root mean square (Zhang et al. 2017 say no more than "equal weights"), uncertainties and
+            covariances set aside.
 
         Raises
         ------
         FitError
-            If nothing was measured.
+            If nothing was measured, or a covariance is singular.
         """
         quantity = ds.attrs["quantity"]
         scale = np.ones(ds.sizes["geometry"])
@@ -129,7 +135,7 @@ class Observations:
         values = np.stack([columns[name] for name in channels])
         std = np.stack([uncertainties[name] for name in channels])
         absent = ~(np.isfinite(values) & np.isfinite(std))
-        return cls(
+        result = cls(
             theta_i=ds["theta_i"].values,
             theta_r=ds["theta_r"].values,
             phi=ds["phi"].values,
@@ -142,16 +148,60 @@ class Observations:
             wavelength=ds["wavelength"].values if "wavelength" in ds.coords else None,
             scale=scale,
         )
+        if COVARIANCE not in ds.data_vars or noise is not None or objective == "paper":
+            return result
+        index = [STOKES.index(name) for name in channels]
+        correlation = correlations(ds[COVARIANCE].values)[:, index][:, :, index]
+        if not np.tril(correlation, -1).any():
+            return result
+        return replace(result, correlation=correlation)._regular(
+            "the covariance of row {} is singular, as if some combination of {} were known exactly: correct it, or "
+            "state a noise, which replaces all uncertainties"
+        )
 
     @property
     def weights(self) -> np.ndarray:
         """1/std, 0 where nothing was measured; shape (C, G)."""
         return 1.0 / self.std
 
-    def weighted_factor(self, i: int, j: int) -> np.ndarray:
-        """Element (i, j) of the whitening factors, 0 where nothing was measured; shape (G,)."""
-        assert self.whitening is not None
-        return np.where(np.isfinite(self.std).all(axis=0), self.whitening[i, j], 0.0)
+    @cached_property
+    def factor(self) -> np.ndarray:
+        """Lower triangular L with L Lᵀ the correlation of the measured channels, shape (G, C, C).
+
+        In the rows and columns of channels that were not measured it is the identity.
+        """
+        size = len(self.channels)
+        measured = np.isfinite(self.std).T
+        if self.correlation is None:
+            return np.broadcast_to(np.eye(size), (len(measured), size, size))
+        return np.linalg.cholesky(self._measured_correlation)
+
+    @cached_property
+    def whitening(self) -> np.ndarray:
+        """Lower triangular W with WᵀW the inverse covariance of the measured channels, shape (C, C, G).
+
+        W times the residuals are independent with variance 1; 0 where nothing was measured.
+        """
+        return np.ascontiguousarray(
+            (np.linalg.inv(self.factor) * self.weights.T[:, None, :]).transpose(1, 2, 0)
+        )
+
+    @property
+    def _measured_correlation(self) -> np.ndarray:
+        assert self.correlation is not None
+        measured = np.isfinite(self.std).T
+        both = measured[:, :, None] & measured[:, None, :]
+        return np.where(both, self.correlation, np.eye(len(self.channels)))
+
+    def _regular(self, message: str) -> Observations:
+        """Itself, if every correlation matrix is positive definite; else FitError with the row and the channels."""
+        bad = np.flatnonzero(~(np.linalg.eigvalsh(self._measured_correlation)[:, 0] > SINGULAR))
+        if bad.size:
+            measured = [
+                c for c, std in zip(self.channels, self.std[:, bad[0]], strict=True) if np.isfinite(std)
+            ]
+            raise FitError(message.format(bad[0], ", ".join(measured)))
+        return self
 
     @property
     def count(self) -> int:
@@ -167,13 +217,10 @@ class Observations:
         """Only some geometries; ``keep`` is a mask or an index array of shape (G,)."""
         chosen: dict[str, Any] = {
             name: None if column is None else column[keep]
-            for name in ("theta_i", "theta_r", "phi", "group", "wavelength", "scale")
+            for name in ("theta_i", "theta_r", "phi", "group", "wavelength", "scale", "correlation")
             for column in [getattr(self, name)]
         }
-        whitening = None if self.whitening is None else self.whitening[:, :, keep]
-        return replace(
-            self, values=self.values[:, keep], std=self.std[:, keep], whitening=whitening, **chosen
-        )
+        return replace(self, values=self.values[:, keep], std=self.std[:, keep], **chosen)
 
     def with_covariance(self, covariance: np.ndarray) -> Observations:
         """The same data with the full covariance of the channels at each geometry.
@@ -181,7 +228,8 @@ class Observations:
         Parameters
         ----------
         covariance
-            Shape (G, C, C) in the order of ``channels``, on the data's own scale.
+            Shape (G, C, C) in the order of ``channels``, on the data's own scale; what belongs to a value that was
+            not measured is not looked at.
 
         Raises
         ------
@@ -195,27 +243,24 @@ class Observations:
                 f"covariance has shape {covariance.shape}: it must be ({self.values.shape[1]}, {size}, {size}), for "
                 f"every geometry the covariance of {', '.join(self.channels)}"
             )
-        scale = np.ones(len(covariance)) if self.scale is None else self.scale
-        covariance = covariance * (scale**2)[:, None, None]
-        measured = np.isfinite(self.std).all(axis=0)
-        symmetric = np.abs(covariance - covariance.transpose(0, 2, 1)).max(axis=(1, 2))
-        whitening = np.zeros_like(covariance)
-        for row in np.flatnonzero(measured):
-            try:
-                if not symmetric[row] <= 1e-9 * np.abs(covariance[row]).max():
-                    raise np.linalg.LinAlgError
-                whitening[row] = np.linalg.inv(np.linalg.cholesky(covariance[row]))
-            except np.linalg.LinAlgError:
-                raise FitError(
-                    f"covariance of geometry {row} is not symmetric and positive definite"
-                ) from None
-        std = np.sqrt(np.einsum("gcc->cg", covariance))
+        measured = np.isfinite(self.std)
+        both = measured.T[:, :, None] & measured.T[:, None, :]
+        covariance = np.where(both, covariance, np.eye(size))
+        with np.errstate(invalid="ignore"):
+            uneven = np.abs(covariance - covariance.transpose(0, 2, 1)).max(axis=(1, 2))
+        diagonal = np.einsum("gcc->cg", covariance)
+        proper = np.isfinite(covariance).all(axis=(1, 2)) & (diagonal > 0.0).all(axis=0)
+        proper &= uneven <= 1e-9 * np.abs(covariance).max(axis=(1, 2))
+        message = "covariance of geometry {} is not symmetric and positive definite"
+        if not proper.all():
+            raise FitError(message.format(int(np.argmin(proper))))
+        scale = 1.0 if self.scale is None else self.scale
         return replace(
             self,
-            std=np.where(measured, std, np.inf),
+            std=np.where(measured, np.sqrt(diagonal) * scale, np.inf),
             std_known=True,
-            whitening=np.ascontiguousarray(whitening.transpose(1, 2, 0)),
-        )
+            correlation=covariance / np.sqrt(diagonal.T[:, :, None] * diagonal.T[:, None, :]),
+        )._regular(message)
 
 
 def _std(ds: xr.Dataset, name: str) -> np.ndarray:

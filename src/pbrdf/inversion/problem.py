@@ -12,11 +12,11 @@ from pbrdf.backend import get_backend
 from pbrdf.errors import FitError
 from pbrdf.inversion.forward import channel_values, measured_mueller
 from pbrdf.inversion.observations import Observations
-from pbrdf.inversion.solver import Residuals
+from pbrdf.inversion.solver import Residuals, linearise
 from pbrdf.models.base import Model
 from pbrdf.models.parameters import Parameter
 
-__all__ = ["Space", "Term", "predict", "residuals"]
+__all__ = ["Space", "Term", "derivatives", "predict", "residuals"]
 
 
 @dataclass(frozen=True)
@@ -139,6 +139,9 @@ def residuals(
 ) -> Residuals:
     """Weighted residuals (model − measured)/std of several data sets of the same form.
 
+    Where the errors of the channels are correlated, the residuals are W (model − measured) with WᵀW the inverse
+    covariance, see :attr:`Observations.whitening`: the sum of their squares is the χ² of all channels together.
+
     Lane number l belongs to data set l // starts; every lane runs over all geometries of its data set.
 
     Parameters
@@ -171,10 +174,10 @@ def residuals(
     points = first.values.shape[1]
     signals = _Signals(space, data, accuracy)
     factors = None
-    if first.whitening is not None:
+    if any(o.correlation is not None for o in data):
         size = len(first.channels)
         factors = {
-            (i, j): backend.upload(Float, np.concatenate([o.weighted_factor(i, j) for o in data]))
+            (i, j): backend.upload(Float, np.concatenate([o.whitening[i, j] for o in data]))
             for i in range(size)
             for j in range(i + 1)
         }
@@ -241,6 +244,44 @@ def predict(
     arrays = [backend.Float(v) + dr.zeros(backend.Float, size) for v in values]
     dr.eval(arrays)
     return {name: array.numpy() for name, array in zip(channels, arrays, strict=True)}
+
+
+def derivatives(
+    space: Space, unknowns: np.ndarray, data: Observations, channels: Sequence[str]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Modelled values of channels and their exact derivatives with respect to the solver's unknowns.
+
+    Parameters
+    ----------
+    space
+        Free and fixed parameters.
+    unknowns
+        Sets of the solver's unknowns, shape (B, P).
+    data
+        Geometries and illumination.
+    channels
+        As for :func:`predict`.
+
+    Returns
+    -------
+    values, jacobian
+        Shapes (B, G, C) and (B, G, C, P).
+    """
+    import drjit as dr
+
+    unknowns = np.asarray(unknowns, dtype=float)
+    batch, size = len(unknowns), len(data.theta_i)
+    UInt32 = get_backend().UInt32
+    count = dr.opaque(UInt32, size)
+    signals = _Signals(space, [data], None)
+
+    def function(u: list[Any], lane: Any, point: Any) -> tuple[list[Any], Any]:
+        # a lane for each geometry of each set of unknowns
+        return signals(u, UInt32(0), lane % count, channels)
+
+    values, jacobian = linearise(function, unknowns.repeat(size, axis=0), len(channels))
+    shape = (batch, size, len(channels))
+    return values.reshape(shape), jacobian.reshape(*shape, -1)
 
 
 class _Signals:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from pbrdf.report.describe import shown_unit
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from pbrdf.inversion.fit import FitResult
     from pbrdf.inversion.identifiability import Identifiability
     from pbrdf.inversion.plausibility import Finding
-    from pbrdf.inversion.profile import Profile
+    from pbrdf.inversion.profile import Contour, Profile
 
 __all__ = ["Checks", "run_checks"]
 
@@ -31,6 +32,8 @@ class Checks:
         Made for every fit.
     profile, bootstrap, cross_validation
         None where they were not asked for.
+    contours
+        Joint regions of the pairs that were asked for.
     """
 
     plausibility: list[Finding]
@@ -39,6 +42,7 @@ class Checks:
     profile: Profile | None = None
     bootstrap: Bootstrap | None = None
     cross_validation: CrossValidation | None = None
+    contours: list[Contour] = field(default_factory=list)
 
     def record(self, result: FitResult) -> dict[str, Any]:
         """The findings in types that JSON has, angles in degrees."""
@@ -82,6 +86,15 @@ class Checks:
             }
         if self.cross_validation is not None:
             record["cross_validation"] = self.cross_validation.sentences()
+        if self.contours:
+            record["contours"] = [
+                {
+                    "parameters": [c.a, c.b],
+                    "chi2_rise": {f"{level:g}": rise for level, rise in c.rises.items()},
+                    "notes": c.notes,
+                }
+                for c in self.contours
+            ]
         return record
 
 
@@ -92,6 +105,7 @@ def run_checks(
     profile: bool = False,
     bootstrap: int = 0,
     cross_validate: str | None = None,
+    contours: Sequence[tuple[str, str]] = (),
     fit_arguments: dict[str, Any] | None = None,
 ) -> Checks:
     """Look at a fit from all sides.
@@ -106,14 +120,17 @@ def run_checks(
         Number of simulated data sets; 0 for none.
     cross_validate
         How to fold the data, see :func:`pbrdf.inversion.crossvalidation.cross_validate`; None for not.
+    contours
+        Pairs of free parameters whose joint confidence regions to find.
     fit_arguments
         Arguments of the fit, for the folds.
 
     Raises
     ------
     FitError
-        If the data cannot be folded as asked.
+        If the data cannot be folded as asked, or a pair is not of two free parameters.
     """
+    regions = [result.contour(a, b) for a, b in contours]
     folds = None
     if cross_validate is not None:
         from pbrdf.inversion.crossvalidation import cross_validate as run_folds
@@ -126,4 +143,5 @@ def run_checks(
         profile=result.profile() if profile else None,
         bootstrap=result.bootstrap(bootstrap) if bootstrap else None,
         cross_validation=folds,
+        contours=regions,
     )

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pbrdf.data.schema import NATURAL_LIGHT
+from pbrdf.data.covariance import correlations
+from pbrdf.data.schema import COVARIANCE, NATURAL_LIGHT
 from pbrdf.data.select import measured_channels
 
 if TYPE_CHECKING:
@@ -49,6 +50,7 @@ def describe(ds: xr.Dataset) -> list[str]:
     lines.append(
         f"{kind} {', '.join(channels)} ({_QUANTITIES[ds.attrs['quantity']]}), {illumination_in_words(ds)}; "
         f"standard uncertainties of {', '.join(uncertain) if uncertain else 'nothing'}"
+        f"{_covariances_in_words(ds)}"
     )
     return lines
 
@@ -80,6 +82,20 @@ def wavelengths_in_words(ds: xr.Dataset) -> str:
     if not known.size:
         return "wavelength not stated"
     return f"{_listed([f'{w:g}' for w in known])} nm"
+
+
+def _covariances_in_words(ds: xr.Dataset) -> str:
+    """At how many geometries covariances are known, and the largest correlation; empty without any."""
+    if COVARIANCE not in ds.data_vars:
+        return ""
+    i, j = np.triu_indices(4, 1)
+    values = ds[COVARIANCE].values
+    rows = np.isfinite(values[:, i, j]).any(axis=1)
+    if not rows.any():
+        return ""
+    largest = np.abs(correlations(values)[:, i, j]).max()
+    where = "" if rows.all() else f" at {rows.sum()} geometries"
+    return f" and their covariances{where} (correlations up to {largest:.2g})"
 
 
 def shown_unit(parameter: Parameter) -> tuple[float, str]:

@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 
     from pbrdf.report.subject import Report
 
-__all__ = ["data_figure", "fit_figure", "save_figure", "starts_figure"]
+__all__ = ["data_figure", "fit_figure", "save_figure", "short_name", "starts_figure"]
 
 #: More cuts than this in one panel cannot be told apart.
 _MOST_CUTS = 10
@@ -71,7 +71,7 @@ def fit_figure(report: Report) -> Figure:
     """
     points = Points.from_fit(report)
     result = report.result
-    title = f"{result.model.name} fitted to {_short_name(report.name, report.dataset)}"
+    title = f"{result.model.name} fitted to {short_name(report.name, report.dataset)}"
     if result.hold_out is not None:
         title += f"; {result.hold_out} held out"
     with styled():
@@ -89,7 +89,7 @@ def data_figure(dataset: xr.Dataset, name: str) -> Figure:
         What to call them.
     """
     with styled():
-        return _draw(Points.from_dataset(dataset), _short_name(name, dataset), None)
+        return _draw(Points.from_dataset(dataset), short_name(name, dataset), None)
 
 
 def starts_figure(report: Report) -> Figure:
@@ -108,7 +108,7 @@ def starts_figure(report: Report) -> Figure:
         {"color": BLUE, "linestyle": "-", "label": f"reached the best optimum ({best.sum()})"},
         {"color": RED, "linestyle": "--", "label": f"ended elsewhere ({(~best).sum()})"},
     ]
-    title = f"{len(best)} starts of the fit to {_short_name(report.name, report.dataset)}"
+    title = f"{len(best)} starts of the fit to {short_name(report.name, report.dataset)}"
     with styled():
         from matplotlib.lines import Line2D
 
@@ -138,7 +138,8 @@ def starts_figure(report: Report) -> Figure:
         return figure
 
 
-def _short_name(name: str, dataset: xr.Dataset) -> str:
+def short_name(name: str, dataset: xr.Dataset) -> str:
+    """What to call data in a title: the file's name and the wavelengths."""
     wavelengths = wavelengths_in_words(dataset)
     return Path(name).name + (f", {wavelengths}" if wavelengths.endswith("nm") else "")
 

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pbrdf.data.covariance import correlations
+from pbrdf.data.schema import COVARIANCE
 from pbrdf.data.select import to_brdf_scale
 
 if TYPE_CHECKING:
@@ -85,6 +87,9 @@ class Points:
                 std = dolp_uncertainty(
                     *(column(f"{name}_measured") for name in ("I", q, u)),
                     *(column(f"{name}_std") for name in ("I", q, u)),
+                    correlation=None
+                    if report.result.data.correlation is None
+                    else _correlation(report.dataset),
                 )
             dolp = Channel(column("dolp_measured"), std, column("dolp_modelled"))
         return cls(
@@ -121,7 +126,7 @@ class Points:
         elif np.isfinite(stokes[1]).any():
             with np.errstate(divide="ignore", invalid="ignore"):
                 value = np.hypot(stokes[1], np.nan_to_num(stokes[2])) / stokes[0]
-            dolp = Channel(value, dolp_uncertainty(*stokes, *std), nothing)
+            dolp = Channel(value, dolp_uncertainty(*stokes, *std, correlation=_correlation(ds)), nothing)
         phi = np.rad2deg(ds["phi"].values)
         return cls(
             theta_i=np.rad2deg(ds["theta_i"].values),
@@ -135,6 +140,10 @@ class Points:
         )
 
 
+def _correlation(ds: xr.Dataset) -> np.ndarray | None:
+    return correlations(ds[COVARIANCE].values) if COVARIANCE in ds.data_vars else None
+
+
 def dolp_uncertainty(
     I: np.ndarray,  # noqa: E741
     Q: np.ndarray,
@@ -142,13 +151,24 @@ def dolp_uncertainty(
     s_I: np.ndarray,
     s_Q: np.ndarray,
     s_U: np.ndarray,
+    *,
+    correlation: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Standard uncertainty of √(Q² + U²)/I from independent ones, to first order.
+    """Standard uncertainty of √(Q² + U²)/I, to first order.
 
     U may be NaN throughout (not measured). Where Q = U = 0, where the first order fails, it is that of Q/I.
+    ``correlation`` is that of the errors of I, Q, U and V, shape (G, 4, 4); None for independent ones.
     """
     U, s_U = np.nan_to_num(U), np.nan_to_num(s_U)
     with np.errstate(divide="ignore", invalid="ignore"):
         size = np.hypot(Q, U)
-        along = np.where(size > 0.0, np.hypot(Q * s_Q, U * s_U) / size, s_Q)
-        return np.hypot(along, size / I * s_I) / np.abs(I)
+        cosine, sine = np.where(size > 0.0, Q / size, 1.0), np.where(size > 0.0, U / size, 0.0)
+        parts = np.stack([-size / I * s_I, cosine * s_Q, sine * s_U], axis=-1)
+        if correlation is None:
+            variance = (parts**2).sum(axis=-1)
+        else:
+            # rounding may leave a fully correlated difference below 0
+            variance = np.maximum(
+                np.einsum("...i,...ij,...j->...", parts, correlation[..., :3, :3], parts), 0.0
+            )
+        return np.sqrt(variance) / np.abs(I)

@@ -129,6 +129,10 @@ def _check_parts(checks: Checks, result: FitResult, verbose: bool) -> Iterator[R
         ]
         if notes:
             yield _headed([("Intervals" if i == 0 else "", [note]) for i, note in enumerate(notes)])
+    regions = [f"{c.a}, {c.b}: {note}" for c in checks.contours for note in c.notes]
+    if regions:
+        yield ""
+        yield _headed([("Contours" if i == 0 else "", [note]) for i, note in enumerate(regions)])
 
 
 def _interval_table(checks: Checks, result: FitResult) -> Table:
