@@ -1,8 +1,8 @@
 """Physics formulas over generic Dr.Jit floats, one family a file.
 
 Everything below works on any Dr.Jit floating-point type (float32 or float64, LLVM or CUDA, with or without
-derivatives); nothing here knows NumPy. Vectors are plain tuples of three floats, so that the same function
-is traced into a fit, an evaluation or a renderer's kernel.
+derivatives), and knows nothing of NumPy but for the last three. Vectors are plain tuples of three floats, so that the
+same function is traced into a fit, an evaluation or a renderer's kernel.
 
 ==================  =====================================================================
 ``geometry``        directions, half vector, scattering angle: paper eq. (10)
@@ -13,5 +13,8 @@ is traced into a fit, an evaluation or a renderer's kernel.
 ``diffuse``         modified Rahman-Pinty-Verstraete shape: eqs (9)-(10)
 ``quadrature``      averages over the lit and seen facets
 ``transmission``    body light leaving (and entering) through the facets: eqs (12)-(13)
+``stokes``          degree and angle of polarisation, of arrays of any kind
+``mueller``         physical realisability of Mueller matrices
+``elements``        polarisers and retarders, in the frame of an instrument
 ==================  =====================================================================
 """

@@ -1,0 +1,1 @@
+"""Instruments: polarimeters, their calibration and reduction, the detector, the goniometer."""
