@@ -6,21 +6,6 @@ from pathlib import Path
 
 import pytest
 
-SHARED = Path(__file__).resolve().parents[3] / "shared" / "data"
-
-
-@pytest.fixture
-def measured():
-    """Path of a measured file that is not part of the repository; skips where it is absent."""
-
-    def find(name: str) -> Path:
-        path = SHARED / name
-        if not path.is_file():
-            pytest.skip(f"measured data absent: ../shared/data/{name} (not part of the repository)")
-        return path
-
-    return find
-
 
 @pytest.fixture
 def text_file(tmp_path):

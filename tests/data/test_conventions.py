@@ -90,6 +90,28 @@ def test_mueller_matrices_convert_with_the_vectors_they_act_on(matrix_conversion
     assert_allclose(outgoing, vector_conversion(np.einsum("nij,nj->ni", MUELLER, STOKES)))
 
 
+def test_covariances_turn_with_the_frame():
+    """Noisy light measured in the frame turned by 90°, where Q = I_s − I_p: both measurements scatter alike."""
+    p, s = frame(0.7, 0.4)
+    noisy = (
+        (0.8 + 0.1j + 0.1 * RNG.normal(size=(200, 1))) * p
+        + (0.3 - 0.6j) * s
+        + 0.05 * RNG.normal(size=(200, 3))
+    )
+    theirs, ours = (
+        np.cov([stokes_of(field, *axes) for field in noisy], rowvar=False) for axes in ((s, -p), (p, s))
+    )
+    assert abs(ours[0, 1]) > 0.1 * np.sqrt(ours[0, 0] * ours[1, 1])
+    assert_allclose(c.covariance_swap_sp(theirs), ours, atol=1e-12)
+
+
+def test_covariances_with_v_change_sign_with_the_handedness():
+    """The other handedness counted as V > 0: of the covariances those with V change sign, its variance does not."""
+    samples = RNG.normal(size=(50, 4)) @ RNG.normal(size=(4, 4))
+    flipped = np.cov(c.stokes_flip_v(samples), rowvar=False)
+    assert_allclose(c.covariance_flip_v(np.cov(samples, rowvar=False)), flipped)
+
+
 def test_scatmech_is_conjugated_with_plus_minus_minus_plus():
     """SCATMECH, psps: Q = I_s − I_p in a right-handed frame, the same V. M12 and M34 change sign, M33 not."""
     signs = np.diag([1, -1, -1, 1])

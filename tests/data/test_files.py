@@ -34,7 +34,11 @@ def test_the_format_can_be_stated(text_file):
 @pytest.mark.parametrize(
     ("name", "options", "words"),
     [
-        ("data.csv", {"format": "xml"}, "'xml' is not known; use one of csv, netcdf, scatmech, cornell"),
+        (
+            "data.csv",
+            {"format": "xml"},
+            "'xml' is not known; use one of csv, netcdf, zarr, scatmech, cornell",
+        ),
         ("data.xyz", {}, r"extension '\.xyz' is not known"),
         ("data.csv", {"were": {}}, "no option 'were'; its options are column, where, skip_invalid"),
         ("data.brdf", {"column": {}}, "no option 'column'; its options are wavelength"),
@@ -52,5 +56,5 @@ def test_a_missing_file_is_named(tmp_path):
 
 
 def test_only_formats_that_keep_everything_are_written(tmp_path, ds):
-    with pytest.raises(DataError, match=r"'\.brdf' cannot be written; use \.csv or \.nc"):
+    with pytest.raises(DataError, match=r"'\.brdf' cannot be written; use \.csv or \.nc or \.zarr"):
         write(ds, tmp_path / "data.brdf")

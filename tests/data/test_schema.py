@@ -24,6 +24,8 @@ def test_uncertainties_share_dimensions_and_units_with_their_variables():
 def test_units_follow_the_quantity_for_intensities_only():
     assert variable_units("mueller", "brdf") == "1/sr"
     assert variable_units("I", "reflectance_factor") == "1"
+    assert variable_units("covariance", "brdf") == "1/sr2"
+    assert variable_units("covariance", "reflectance_factor") == "1"
     assert variable_units("dolp", "brdf") == "1"
     assert variable_units("theta_i", "dn") == "rad"
     assert variable_units("wavelength", "dn") == "nm"

@@ -49,6 +49,25 @@ def test_radiance_is_divided_by_the_cosine_of_incidence(quantity):
     assert to_brdf_scale(brdf).identical(brdf)
 
 
+@pytest.mark.parametrize(
+    ("quantity", "factor"),
+    [("reflectance_factor", [1 / np.pi, 1 / np.pi]), ("dn", [1.0, 2.0]), ("brdf", [1.0, 1.0])],
+)
+def test_a_covariance_is_scaled_with_the_square_of_the_values_factor(quantity, factor):
+    """Var(c x) = c² Var(x): correlations stay, and the diagonal stays the square of the standard uncertainty."""
+    covariance = np.array(
+        [[4.0, 1.5, -0.3, np.nan], [1.5, 1.0, 0.2, np.nan], [-0.3, 0.2, 2.0, np.nan], 4 * [np.nan]]
+    )
+    ds = make_dataset(THETA_I, 0.5, 0.0, quantity=quantity, I=9.0, Q=1.0, U=0.5, covariance=covariance)
+    brdf = to_brdf_scale(ds)
+    factor = np.array(factor)
+    assert_allclose(brdf["covariance"], covariance * factor[:, None, None] ** 2)
+    assert_array_equal(brdf["covariance"][:, 1, 1], brdf["Q_std"] ** 2)
+    assert brdf["covariance"].attrs["units"] == "1/sr2"
+    assert ds["covariance"].attrs["units"] != "1/sr2" or quantity == "brdf", "the original is not changed"
+    validate(brdf)
+
+
 def test_wavelengths_are_met_within_half_a_nanometre():
     available = np.array([400.0, 410.0, 420.0])
     assert match_wavelengths(available, None, "f") == [0, 1, 2]

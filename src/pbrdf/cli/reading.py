@@ -34,7 +34,7 @@ class Reading:
 
     Attributes
     ----------
-    format, quantity, azimuth, stokes, illumination, cosine_weighted, angles, skip_invalid
+    format, quantity, azimuth, stokes, illumination, cosine_weighted, angles, skip_invalid, every
         As in :func:`pbrdf.read`; None and False where not given.
     column, where, select
         Texts ``NAME=VALUE``.
@@ -54,6 +54,7 @@ class Reading:
     illumination: str | None
     cosine_weighted: bool | None
     angles: str | None
+    every: int | None
 
     def stated(self) -> dict[str, Any]:
         """What was given, by option."""
@@ -85,8 +86,6 @@ class Reading:
         for name, example in (("column", "I=f_r_per_sr"), ("where", "material=white")):
             if name in options:
                 options[name] = pairs(options[name], f"--{name}", example)
-        if Path(source).is_dir():
-            raise DataError(f"{source}: this is a folder; name a file in it")
         if Path(source).exists():
             try:
                 dataset = read(source, **options)
@@ -192,7 +191,10 @@ _OPTIONS: dict[str, tuple[Any, Any]] = {
         False,
     ),
     "format": (
-        _option(str | None, "csv, netcdf, scatmech or cornell; found out by itself if not given."),
+        _option(
+            str | None,
+            "csv, netcdf, zarr, scatmech, cornell, pbsdf or merl; found out by itself if not given.",
+        ),
         None,
     ),
     "quantity": (
@@ -214,6 +216,19 @@ _OPTIONS: dict[str, tuple[Any, Any]] = {
         None,
     ),
     "angles": (_option(str | None, "Unit of the file's angles: degrees or radians."), None),
+    "every": (
+        Annotated[
+            int | None,
+            typer.Option(
+                help="Of a .pbsdf or MERL table, take one node in this many along each angle; 1 is all of them.",
+                show_default="so many that at most 20 000 cells are left",
+                min=1,
+                metavar="N",
+                rich_help_panel=_PANEL,
+            ),
+        ],
+        None,
+    ),
 }
 
 

@@ -11,9 +11,12 @@ import xarray as xr
 
 from pbrdf.data.cornell import read_cornell
 from pbrdf.data.csv_table import header_names, read_csv, write_csv
+from pbrdf.data.merl import read_merl
 from pbrdf.data.netcdf import read_netcdf, write_netcdf
+from pbrdf.data.pbsdf import read_pbsdf
 from pbrdf.data.scatmech import has_scatmech_columns, read_scatmech
 from pbrdf.data.storage import read_lines
+from pbrdf.data.zarr_folder import read_zarr, write_zarr
 from pbrdf.errors import DataError
 
 __all__ = ["FORMATS", "read", "write"]
@@ -22,8 +25,11 @@ __all__ = ["FORMATS", "read", "write"]
 FORMATS: dict[str, Callable[..., xr.Dataset]] = {
     "csv": read_csv,
     "netcdf": read_netcdf,
+    "zarr": read_zarr,
     "scatmech": read_scatmech,
     "cornell": read_cornell,
+    "pbsdf": read_pbsdf,
+    "merl": read_merl,
 }
 _EXTENSIONS = {
     ".csv": "csv",
@@ -32,9 +38,16 @@ _EXTENSIONS = {
     ".dat": "csv",
     ".nc": "netcdf",
     ".nc4": "netcdf",
+    ".zarr": "zarr",
     ".brdf": "cornell",
+    ".pbsdf": "pbsdf",
+    ".binary": "merl",
 }
-_WRITERS: dict[str, Callable[[xr.Dataset, Path], None]] = {".csv": write_csv, ".nc": write_netcdf}
+_WRITERS: dict[str, Callable[[xr.Dataset, Path], None]] = {
+    ".csv": write_csv,
+    ".nc": write_netcdf,
+    ".zarr": write_zarr,
+}
 
 
 def read(
@@ -45,16 +58,17 @@ def read(
     Parameters
     ----------
     path
-        The file.
+        The file; for Zarr the folder.
     column
         For CSV: the file's column names by the names used here, see :func:`pbrdf.data.csv_table.read_csv`.
     format
-        ``"csv"``, ``"netcdf"``, ``"scatmech"`` or ``"cornell"``; None finds it out from the extension and,
-        for text tables, the column names.
+        ``"csv"``, ``"netcdf"``, ``"zarr"``, ``"scatmech"``, ``"cornell"``, ``"pbsdf"`` or ``"merl"``; None finds it out
+        from the extension and, for text tables, the column names.
     **options
         Options of the format's reader: for ``"csv"`` those of :func:`pbrdf.data.csv_table.read_csv`
         (`where`, `skip_invalid`, `quantity`, `azimuth`, `stokes`, `illumination`, `cosine_weighted`,
-        `angles`); for ``"scatmech"`` and ``"cornell"`` `wavelength` in nm, one or several.
+        `angles`); for ``"scatmech"``, ``"cornell"`` and ``"pbsdf"`` `wavelength` in nm, one or several; for
+        ``"pbsdf"`` and ``"merl"`` `every`, see :func:`pbrdf.data.pbsdf.read_pbsdf`.
 
     Returns
     -------
@@ -67,8 +81,10 @@ def read(
         If the file, its format or an option is not understood; names line and column where there is one.
     """
     path = Path(path)
-    if not path.is_file():
+    if not path.exists():
         raise DataError(f"{path}: there is no such file")
+    if path.is_dir() and (format or _EXTENSIONS.get(path.suffix.lower())) != "zarr":
+        raise DataError(f"{path}: this is a folder; name a file in it")
     name = format if format is not None else _detect(path)
     if name not in FORMATS:
         raise DataError(f"{path}: the format {name!r} is not known; use one of {', '.join(FORMATS)}")
@@ -96,14 +112,14 @@ def _detect(path: Path) -> str:
 
 
 def write(ds: xr.Dataset, path: str | Path) -> None:
-    """Write a data set as ``.csv`` or ``.nc``, by the extension; reading it gives back the same bits.
+    """Write a data set as ``.csv``, ``.nc`` or ``.zarr``, by the extension; reading it gives back the same bits.
 
     Parameters
     ----------
     ds
         A valid data set.
     path
-        The file; replaced, when the new one is complete, if it exists.
+        The file (for Zarr the folder); replaced, when the new one is complete, if it exists.
 
     Raises
     ------
