@@ -94,3 +94,12 @@ def test_lines_end_at_line_ends_only(tmp_path):
     path = tmp_path / "data.csv"
     path.write_bytes("\ufeffa\u2028b\r\nc\x0cd\n".encode())
     assert read_lines(path) == ["a\u2028b", "c\x0cd", ""]
+
+
+def test_a_file_in_place_of_the_folder_is_reported_as_such(tmp_path):
+    (tmp_path / "file").write_text("not a folder")
+    with (
+        pytest.raises(DataError, match="cannot be written"),
+        atomic_target(tmp_path / "file" / "x.csv") as target,
+    ):
+        target.write_text("x")
