@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from rich.console import Console
 
-__all__ = ["fail", "output_console", "progress_bar", "reading_width", "warn"]
+__all__ = ["fail", "output_console", "progress_bar", "reading_width", "stage_bar", "warn"]
 
 #: Lines longer than this are hard to read, however wide the terminal is.
 _WIDEST = 110
@@ -51,6 +51,26 @@ def progress_bar(what: str, quiet: bool = False) -> Iterator[Callable[[int, int]
     callable
         To be called with the number of finished pieces and of all.
     """
+    with stage_bar(quiet, what) as show:
+        yield lambda finished, total: show(what, finished, total)
+
+
+@contextmanager
+def stage_bar(quiet: bool = False, first: str = "") -> Iterator[Callable[[str, int, int], None]]:
+    """A progress bar as of :func:`progress_bar` for work in stages.
+
+    Parameters
+    ----------
+    quiet
+        Whether to show nothing at all.
+    first
+        What stands beside the bar before the first call.
+
+    Yields
+    ------
+    callable
+        To be called with the name of the stage, the number of its finished pieces and of all.
+    """
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
@@ -64,5 +84,7 @@ def progress_bar(what: str, quiet: bool = False) -> Iterator[Callable[[int, int]
         transient=True,
         disable=quiet or not console.is_terminal,
     ) as progress:
-        task = progress.add_task(what, total=None)
-        yield lambda finished, total: progress.update(task, completed=finished, total=total)
+        task = progress.add_task(first, total=None)
+        yield lambda stage, finished, total: progress.update(
+            task, description=stage, completed=finished, total=total
+        )

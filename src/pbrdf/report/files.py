@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import secrets
 import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,7 +26,14 @@ if TYPE_CHECKING:
 
     from pbrdf.inversion.fit import Estimate
 
-__all__ = ["FIGURE_FORMATS", "comparison_file", "fit_record", "require_writable", "write_report"]
+__all__ = [
+    "FIGURE_FORMATS",
+    "comparison_file",
+    "complete_folder",
+    "fit_record",
+    "require_writable",
+    "write_report",
+]
 
 FIGURE_FORMATS = ("png", "pdf", "svg")
 
@@ -53,10 +62,7 @@ def require_writable(directory: Path) -> None:
 
 
 def write_report(report: Report, directory: Path, *, figure_format: str = "png") -> list[Path]:
-    """Write the model, the numbers, the comparison, the figures and the summary of a fit.
-
-    Everything is written beside the folder first. A new folder appears complete; in one that is there, the
-    files of the same names are replaced and others are left alone.
+    """Write the model, the numbers, the comparison, the figures and the summary of a fit, all or nothing.
 
     Parameters
     ----------
@@ -77,11 +83,12 @@ def write_report(report: Report, directory: Path, *, figure_format: str = "png")
     DataError
         If the folder cannot be written.
     """
+    from pbrdf.report.contour_figure import contour_figure
     from pbrdf.report.figures import fit_figure, save_figure, starts_figure
 
-    temporary = _beside(directory)
-    try:
-        temporary.mkdir(parents=True)
+    names = ["summary.txt", f"figure.{figure_format}", "model.json", "fit.json", "comparison.nc"]
+    names.append(f"starts.{figure_format}")
+    with complete_folder(directory) as temporary:
         (temporary / "summary.txt").write_text(summary_text(report), encoding="utf-8")
         save_figure(fit_figure(report), temporary / f"figure.{figure_format}")
         report.result.model.to_json(temporary / "model.json")
@@ -89,18 +96,39 @@ def write_report(report: Report, directory: Path, *, figure_format: str = "png")
         (temporary / "fit.json").write_text(record + "\n", encoding="utf-8")
         comparison_file(report).to_netcdf(temporary / "comparison.nc", engine="h5netcdf")
         save_figure(starts_figure(report), temporary / f"starts.{figure_format}")
-        names = ["summary.txt", f"figure.{figure_format}", "model.json", "fit.json", "comparison.nc"]
-        names.append(f"starts.{figure_format}")
+        if report.checks is not None and report.checks.contours:
+            save_figure(contour_figure(report), temporary / f"contours.{figure_format}")
+            names.append(f"contours.{figure_format}")
+    return [directory / name for name in names]
+
+
+@contextmanager
+def complete_folder(directory: Path) -> Iterator[Path]:
+    """A folder to fill that becomes `directory` when the block ends well, and goes otherwise.
+
+    A new folder appears complete; in one that is there, the files of the same names are replaced and others are left
+    alone.
+
+    Raises
+    ------
+    DataError
+        If the folder cannot be written.
+    """
+    temporary = _beside(directory)
+    try:
+        temporary.mkdir(parents=True)
+        yield temporary
         if directory.is_dir():
-            for name in names:
-                (temporary / name).replace(directory / name)
+            for file in sorted(path for path in temporary.rglob("*") if path.is_file()):
+                target = directory / file.relative_to(temporary)
+                target.parent.mkdir(parents=True, exist_ok=True)
+                file.replace(target)
         else:
             temporary.rename(directory)
     except OSError as error:
         raise DataError(f"{directory}: cannot be written: {error.strerror or error}") from error
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
-    return [directory / name for name in names]
 
 
 def _beside(directory: Path) -> Path:
