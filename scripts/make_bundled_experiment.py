@@ -18,49 +18,30 @@ import numpy as np
 
 from pbrdf.data import make_dataset, write
 from pbrdf.data.paints import PAINTS, WAVELENGTH, load_paint
+from pbrdf.instruments.goniometer import Protocol
 
-BISTATIC = (60.0, 80.0, 100.0)  # degrees, camera positions 1, 2, 3
-SAMPLE_ANGLES = 21
-LARGEST_ZENITH = 85.0  # degrees
 NOISE = {"I": 0.01, "Q": 0.01, "U": 0.01, "V": 0.05}  # relative to I
 SEED = 20171102
 TARGET = Path(__file__).parents[1] / "src" / "pbrdf" / "data" / "experiment"
 
 
-def geometries() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """θ_i, θ_r, φ in degrees and the camera position, shape (63,) each."""
-    j = np.arange(SAMPLE_ANGLES) - SAMPLE_ANGLES // 2
-    growth = np.sign(j) * (j / (SAMPLE_ANGLES // 2)) ** 2
-    theta_i, theta_r, group = [], [], []
-    for position, bistatic in enumerate(BISTATIC, start=1):
-        half = bistatic / 2.0
-        reach = np.where(j < 0, LARGEST_ZENITH - half, min(LARGEST_ZENITH - half, half))
-        offset = np.round(reach * growth, 2)
-        theta_i.append(half - offset)
-        theta_r.append(half + offset)
-        group.append(np.full(SAMPLE_ANGLES, position))
-    signed = np.concatenate(theta_r)
-    phi = np.where(signed < 0.0, 180.0, 0.0)  # the camera has crossed the normal to the source's side
-    return np.concatenate(theta_i), np.abs(signed), phi, np.concatenate(group)
-
-
 def main() -> None:
     """Write one CSV file a paint."""
-    theta_i, theta_r, phi, group = geometries()
-    angles = [np.deg2rad(a) for a in (theta_i, theta_r, phi)]
+    protocol = Protocol.in_plane()
+    angles = protocol.theta_i, protocol.theta_r, protocol.phi
     rng = np.random.default_rng(SEED)
     TARGET.mkdir(exist_ok=True)
     for name in PAINTS:
         stokes = load_paint(name).stokes(*angles)
         std = {channel: share * stokes[:, 0] for channel, share in NOISE.items()}
-        noisy = {c: stokes[:, i] + std[c] * rng.standard_normal(len(group)) for i, c in enumerate("IQUV")}
+        noisy = {c: stokes[:, i] + std[c] * rng.standard_normal(len(protocol)) for i, c in enumerate("IQUV")}
         ds = make_dataset(
             *angles,
             quantity="brdf",
             **noisy,
             std=std,
             wavelength=WAVELENGTH,
-            group=group,
+            group=protocol.group,
             simulated=True,
             attrs={
                 "scale": "arbitrary",  # Table 1 is on a camera's scale, see pbrdf.data.paints

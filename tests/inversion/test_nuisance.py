@@ -119,7 +119,8 @@ def test_an_extended_source_is_the_average_over_its_disc():
         rays = omega + (r * np.cos(turn))[:, None] * p + (r * np.sin(turn))[:, None] * s
         rays /= np.linalg.norm(rays, axis=1, keepdims=True)
         azimuth_of_source = np.arctan2(rays[:, 1], rays[:, 0])
-        expected = specular_only.stokes(np.arccos(rays[:, 2]), tr, np.pi - azimuth_of_source)[:, 0].mean()
+        each = specular_only.stokes(np.arccos(rays[:, 2]), tr, np.pi - azimuth_of_source)[:, 0]
+        expected = (each * rays[:, 2]).mean() / rays[:, 2].mean()  # every ray by its share of the irradiance
         space = Space(
             pbrdf.DoubleGauss,
             {},

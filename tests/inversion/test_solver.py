@@ -8,7 +8,7 @@ import pytest
 from scipy.optimize import least_squares
 
 from pbrdf.backend import get_backend
-from pbrdf.inversion.solver import Residuals, Status, solve
+from pbrdf.inversion.solver import Residuals, Status, linearise, solve
 
 
 def exponential_problem(data: np.ndarray, x: np.ndarray) -> Residuals:
@@ -229,3 +229,15 @@ def test_a_gaussian_prior_counts_like_one_more_measurement(noisy_exponentials):
         )
         np.testing.assert_allclose(solution.u[lane], peer.x, rtol=1e-6)
         np.testing.assert_allclose(solution.information[lane], peer.jac.T @ peer.jac, rtol=1e-4)
+
+
+@pytest.mark.parametrize("batch", [1, 7])
+def test_linearise_gives_values_and_their_derivatives(batch):
+    """r = u0 exp(−u1 x) + u2 at x = 0.7: derivatives exp(−u1 x), −u0 x exp(−u1 x), 1."""
+    u = np.random.default_rng(1).uniform(0.5, 2.0, (batch, 3))
+    problem = exponential_problem(np.zeros((batch, 1)), np.array([0.7]))
+    values, jacobian = linearise(problem.function, u, 1)
+    decay = np.exp(-0.7 * u[:, 1])
+    np.testing.assert_allclose(values[:, 0], u[:, 0] * decay + u[:, 2], rtol=1e-12)
+    expected = np.stack([decay, -0.7 * u[:, 0] * decay, np.ones(batch)], axis=-1)
+    np.testing.assert_allclose(jacobian[:, 0], expected, rtol=1e-12)

@@ -10,30 +10,13 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import drjit as dr
-import numpy as np
 
 from pbrdf.models.base import Model
 from pbrdf.models.evaluation import horizon_guard, is_zero, weighted_sum
-from pbrdf.optics.geometry import Geometry, dot, geometry_from_angles
+from pbrdf.models.extended_source import kernel_under_disc
+from pbrdf.optics.geometry import geometry_from_angles
 
 __all__ = ["channel_values", "measured_mueller"]
-
-
-def _disc_rule(radii: int, turns: int) -> tuple[list[float], list[float], list[float]]:
-    """Points and weights of a uniform average over the unit disc: Gauss in r², even in angle."""
-    nodes, weights = np.polynomial.legendre.leggauss(radii)
-    x, y, w = [], [], []
-    for k in range(radii):
-        r = math.sqrt(0.5 * (1.0 + nodes[k]))
-        for j in range(turns):
-            turn = 2.0 * math.pi * (j + 0.5 * (k % 2)) / turns
-            x.append(r * math.cos(turn))
-            y.append(r * math.sin(turn))
-            w.append(0.5 * float(weights[k]) / turns)
-    return x, y, w
-
-
-_DISC = _disc_rule(6, 12)
 
 
 def measured_mueller(
@@ -70,60 +53,8 @@ def measured_mueller(
         f = model.kernel(geometry, roles, "total")
         alive: Any = f
     else:
-        diffuse = model.kernel(geometry, roles, "diffuse")
-        specular = _averaged_specular(model, geometry, roles)
-        f = [
-            [a + b for a, b in zip(row, other, strict=True)]
-            for row, other in zip(diffuse, specular, strict=True)
-        ]
-        alive = (diffuse, specular)
+        f, alive = kernel_under_disc(model, geometry, roles, roles["source"])
     return [[_masked(visible, x) for x in row] for row in f], alive
-
-
-def _averaged_specular(model: Model, geometry: Geometry, roles: Mapping[str, Any]) -> list[list[Any]]:
-    """Specular part averaged over a uniform round source; the frames of the central ray serve for all of it."""
-    F = type(roles["source"])
-    UInt = dr.uint32_array_t(F)
-    columns = [F(column) for column in _DISC]
-    count = len(_DISC[0])
-    names = [name for name in roles if roles[name] is not None]
-    template = model.kernel(geometry, roles, "specular")
-    used = [(i, j) for i in range(4) for j in range(4) if not is_zero(template[i][j])]
-
-    def body(k: Any, total: Any, geometry: Geometry, values: Any) -> tuple[Any, ...]:
-        named = {**roles, **dict(zip(names, values, strict=True))}
-        x, y, weight = (dr.gather(F, column, k) for column in columns)
-        f = model.kernel(_turned(geometry, named["source"] * x, named["source"] * y), named, "specular")
-        total = [dr.fma(weight, f[i][j], t) for (i, j), t in zip(used, total, strict=True)]
-        return k + 1, total, geometry, values
-
-    sums = dr.while_loop(
-        (UInt(0), [dr.zeros(F, 1) for _ in used], geometry, [roles[name] for name in names]),
-        lambda k, *_: k < count,
-        body,
-        label="source",
-        max_iterations=-1,
-    )[1]
-    matrix: list[list[Any]] = [[0.0] * 4 for _ in range(4)]
-    for (i, j), value in zip(used, sums, strict=True):
-        matrix[i][j] = value
-    return matrix
-
-
-def _turned(geometry: Geometry, along_p: Any, along_s: Any) -> Geometry:
-    """The geometry with the source displaced by small angles along p_i and s_i."""
-    moved = tuple(
-        o + along_p * p + along_s * s
-        for o, p, s in zip(geometry.omega_i, geometry.p_i, geometry.s_i, strict=True)
-    )
-    scale = dr.rsqrt(dot(moved, moved))
-    # a source that reaches below the horizon lights nothing there; its rays are kept just above
-    omega_i = (moved[0] * scale, moved[1] * scale, dr.maximum(moved[2] * scale, 1e-3))
-    h = tuple(a + b for a, b in zip(omega_i, geometry.omega_r, strict=True))
-    inverse = dr.rsqrt(dot(h, h))
-    facet = tuple(c * inverse for c in h)
-    sin_i = dr.sqrt(dr.maximum(1.0 - dr.square(omega_i[2]), 1e-12))
-    return geometry._replace(omega_i=omega_i, sin_i=sin_i, facet=facet, cos_beta=dot(omega_i, facet))
 
 
 def _masked(visible: Any, value: Any) -> Any:

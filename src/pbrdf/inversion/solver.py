@@ -23,7 +23,7 @@ import numpy as np
 
 from pbrdf.backend import get_backend
 
-__all__ = ["LOSSES", "Residuals", "Solution", "Status", "solve"]
+__all__ = ["LOSSES", "Residuals", "Solution", "Status", "linearise", "solve"]
 
 #: Iterations of one kernel launch, after which stopped lanes leave the batch. A batch of at most SMALL_BATCH
 #: lanes runs to its end in one launch: recording the kernel anew would take longer than idle lanes do.
@@ -31,6 +31,10 @@ ROUNDS, SMALL_BATCH = 6, 1024
 
 #: How often a step is solved again with the unknowns that would cross a bound held on it.
 BOUND_PASSES = 2
+
+
+#: What is evaluated: unknowns, lane and point to values and whatever was computed on the way.
+Function = Callable[[list[Any], Any, Any], tuple[Sequence[Any], Any]]
 
 
 def _soft_l1(z: Any) -> tuple[Any, Any]:
@@ -99,7 +103,7 @@ class Residuals:
         ρ: one of ``LOSSES``; r is in standard deviations, so a loss departs from squares at about 1.
     """
 
-    function: Callable[[list[Any], Any, Any], tuple[Sequence[Any], Any]]
+    function: Function
     points: int
     penalty: Callable[[list[Any]], list[tuple[int, Any, Any]]] | None = None
     loss: str = "linear"
@@ -200,6 +204,53 @@ def solve(
         if progress is not None:
             progress(max(batch - len(lanes), 0), batch)
     return result.solution()
+
+
+def linearise(function: Function, u: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:
+    """Values of a function and their exact derivatives by the unknowns, lane by lane, at point 0 of each.
+
+    Parameters
+    ----------
+    function
+        As in :class:`Residuals`, returning ``size`` values.
+    u
+        Unknowns, shape (B, P).
+    size
+        Number of values.
+
+    Returns
+    -------
+    values, jacobian
+        Shapes (B, C) and (B, C, P).
+    """
+    import drjit as dr
+
+    backend = get_backend()
+    Float, UInt32 = backend.Float, backend.UInt32
+    batch, unknowns = u.shape
+    # a batch of one would be compiled apart
+    padded = u if batch > 1 else u.repeat(2, axis=0)
+    columns = [backend.upload(Float, padded[:, i]) for i in range(unknowns)]
+    lane = dr.arange(UInt32, len(padded))
+    turns = dr.opaque(UInt32, 1)
+    zeros = [dr.zeros(Float, len(padded)) for _ in range(size)]
+
+    # a loop of one turn: derivatives of loops inside the function need a loop around them
+    def body(turn: Any, u: list[Any], lane: Any, values: list[Any], J: list[list[Any]]) -> tuple[Any, ...]:
+        values, J = _jacobian(function, u, lane, turn)
+        return turn + 1, u, lane, values, J
+
+    out = dr.while_loop(
+        (UInt32(0), columns, lane, zeros, [list(zeros) for _ in range(unknowns)]),
+        lambda turn, *_: turn < turns,
+        body,
+        mode="symbolic",
+        label="linearise",
+    )
+    dr.eval(out)
+    values = np.stack([x.numpy() for x in out[3]], axis=-1)
+    jacobian = np.stack([np.stack([x.numpy() for x in column], axis=-1) for column in out[4]], axis=-1)
+    return values[:batch], jacobian[:batch]
 
 
 @dataclass
@@ -394,20 +445,7 @@ def _normal_equations(residuals: Residuals, u: list[Any], lane: Any) -> tuple[An
     triangle = [(i, j) for i in range(size) for j in range(i + 1)]
 
     def body(point: Any, u: list[Any], lane: Any, cost: Any, A: list[Any], g: list[Any]) -> tuple[Any, ...]:
-        unknown = [Float(v) for v in u]
-        dr.enable_grad(unknown)
-        values, alive = residuals.function(unknown, lane, point)
-        r = [Float(v) for v in values]
-        J: list[list[Any]] = []
-        for v in unknown:
-            dr.set_grad(v, 1.0)
-            dr.enqueue(dr.ADMode.Forward, v)
-            dr.traverse(dr.ADMode.Forward, flags=dr.ADFlag.ClearInterior)
-            J.append([dr.grad(x) for x in r])
-            dr.clear_grad(r)
-            dr.clear_grad(v)
-        del alive
-        r = [dr.detach(x) for x in r]
+        r, J = _jacobian(residuals.function, u, lane, point)
         if residuals.loss == "linear":
             cost = cost + 0.5 * _inner(r, r)
             weighted = J
@@ -437,6 +475,27 @@ def _normal_equations(residuals: Residuals, u: list[Any], lane: Any) -> tuple[An
             A[triangle.index((i, i))] = A[triangle.index((i, i))] + slope * slope
             g[i] = g[i] + slope * r
     return cost, A, g
+
+
+def _jacobian(function: Function, u: list[Any], lane: Any, point: Any) -> tuple[list[Any], list[list[Any]]]:
+    """Values at one point and their derivatives by each unknown (forward mode), inside a symbolic loop."""
+    import drjit as dr
+
+    Float = type(u[0])
+    unknown = [Float(v) for v in u]
+    dr.enable_grad(unknown)
+    values, alive = function(unknown, lane, point)
+    r = [Float(v) for v in values]
+    J: list[list[Any]] = []
+    for v in unknown:
+        dr.set_grad(v, 1.0)
+        dr.enqueue(dr.ADMode.Forward, v)
+        dr.traverse(dr.ADMode.Forward, flags=dr.ADFlag.ClearInterior)
+        J.append([dr.grad(x) for x in r])
+        dr.clear_grad(r)
+        dr.clear_grad(v)
+    del alive
+    return [dr.detach(x) for x in r], J
 
 
 def _inner(a: Sequence[Any], b: Sequence[Any]) -> Any:

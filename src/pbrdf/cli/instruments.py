@@ -1,0 +1,39 @@
+"""An instrument as named on the command line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pbrdf.errors import DataError
+
+if TYPE_CHECKING:
+    from pbrdf.instruments.instrument import Instrument
+
+__all__ = ["open_instrument"]
+
+
+def open_instrument(source: str) -> Instrument:
+    """An instrument from its TOML file or the name of a built-in one.
+
+    Parameters
+    ----------
+    source
+        Path or name; a file of that name goes before a built-in instrument.
+
+    Raises
+    ------
+    DataError
+        If there is neither, or the file is not understood.
+    """
+    from pbrdf.instruments.instrument_files import load_instrument
+    from pbrdf.instruments.presets import PRESETS, preset
+
+    path = Path(source)
+    if path.exists() or path.suffix:
+        return load_instrument(path)
+    if source in PRESETS:
+        return preset(source)
+    raise DataError(
+        f"{source}: there is no such file, and no built-in instrument of that name: {', '.join(PRESETS)}"
+    )

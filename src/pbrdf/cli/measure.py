@@ -1,0 +1,193 @@
+"""``pbrdf measure``: a virtual measurement, from models to the files that an instrument leaves."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from pbrdf.cli.console import progress_bar, warn
+from pbrdf.cli.fit import Backend
+from pbrdf.cli.instruments import open_instrument
+from pbrdf.cli.sources import open_model
+from pbrdf.cli.values import angles, number
+from pbrdf.errors import PbrdfError
+
+if TYPE_CHECKING:
+    from pbrdf.instruments.detector import Detector
+    from pbrdf.instruments.goniometer import Protocol
+
+__all__ = ["measure"]
+
+_POSITIONS = "60,80,100"
+
+
+def measure(
+    sources: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="MODEL", help="Models' JSON files or bundled paints: samples side by side in the picture."
+        ),
+    ],
+    output: Annotated[Path, typer.Option("--output", "-o", help="The new folder.")] = Path("measurement"),
+    positions: Annotated[
+        str | None,
+        typer.Option(
+            help="Camera positions: bistatic angles between source and camera.", show_default=_POSITIONS
+        ),
+    ] = None,
+    sample_angles: Annotated[
+        str | None,
+        typer.Option(
+            help="Angles between the sample's surface and the source: START:STOP:STEP or a list.",
+            show_default="21 at each position, crowded to the mirror direction",
+        ),
+    ] = None,
+    angle_table: Annotated[
+        Path | None,
+        typer.Option("--angles", help="Take the geometries of an angle table instead, e.g. of `pbrdf plan`."),
+    ] = None,
+    instrument: Annotated[
+        str,
+        typer.Option(
+            help="paper, conservative, sony_imx250mzr, or an instrument's TOML file.", metavar="NAME|FILE"
+        ),
+    ] = "paper",
+    bits: Annotated[
+        int | None,
+        typer.Option(help="Bits of the converter over the same range, instead of the instrument's."),
+    ] = None,
+    exposure: Annotated[
+        str,
+        typer.Option(
+            help="each: the brightest pixel of each geometry at 80 % of the range; common: one for all; or digital "
+            "numbers per unit of f cos(theta_i).",
+            metavar="each|common|NUMBER",
+        ),
+    ] = "each",
+    calibration: Annotated[
+        str,
+        typer.Option(
+            help="Errors of the instrument's stated accuracy: anew for each reading, fixed for all, or none.",
+            metavar="reading|fixed|none",
+        ),
+    ] = "reading",
+    source_radius: Annotated[float, typer.Option(help="Angular radius of the source, degrees.")] = 0.0,
+    source_stability: Annotated[
+        float | None,
+        typer.Option(help="Relative, from one geometry to the next.", show_default="the instrument's"),
+    ] = None,
+    source_polarization: Annotated[
+        str | None,
+        typer.Option(help="Residual polarisation of the source, Q/I,U/I,V/I.", metavar="Q,U,V"),
+    ] = None,
+    angle_error: Annotated[float, typer.Option(help="Of the sample angle at each geometry, degrees.")] = 0.0,
+    camera_error: Annotated[float, typer.Option(help="Of each camera position, degrees.")] = 0.0,
+    zero_error: Annotated[
+        float, typer.Option(help="Of the zero of the sample angle at each camera position, degrees.")
+    ] = 0.0,
+    tilt_error: Annotated[
+        float,
+        typer.Option(help="Of the sample's tilt out of the plane of incidence at each geometry, degrees."),
+    ] = 0.0,
+    pixels: Annotated[int, typer.Option(help="Side of the square of pixels that shows a sample.")] = 20,
+    wavelength: Annotated[float | None, typer.Option(help="Wavelength to write down, nm.")] = None,
+    seed: Annotated[int, typer.Option(help="Seed of all errors and noise.", min=0)] = 0,
+    backend: Backend = None,
+) -> None:
+    """Measure painted samples on a virtual goniometer: raw frames, and everything to reduce them.
+
+    Writes a folder with the frames, polarimeter.toml, angles.csv and regions.toml as `pbrdf reduce` takes them,
+    with the data sets that it gives (SAMPLE.nc) and the models behind them.
+
+    The paper's measurement: `pbrdf measure white matte-white-thick --source-radius 0.5 -o virtual`
+
+    Of a plan: `pbrdf measure white --angles plan.csv -o planned && pbrdf fit planned/white.nc`
+    """
+    import pbrdf
+    from pbrdf.data.paints import PAINTS, WAVELENGTH
+    from pbrdf.instruments.measurement_folder import require_new, write_measurement
+    from pbrdf.instruments.source import AngleErrors, Source
+    from pbrdf.instruments.virtual_experiment import VirtualExperiment
+
+    require_new(output)
+    if backend is not None:
+        pbrdf.set_backend(backend)
+    taken = open_instrument(instrument)
+    if bits is not None:
+        taken = replace(taken, detector=_with_bits(taken.detector, bits))
+    samples = {}
+    for source in sources:
+        name = Path(source).stem
+        if name in samples:
+            raise PbrdfError(f"two samples are called {name!r}: give each a name of its own")
+        samples[name] = open_model(source)
+    protocol = _protocol(positions, sample_angles, angle_table, taken.reference_angle)
+    if wavelength is None and all(source in PAINTS and not Path(source).exists() for source in sources):
+        wavelength = WAVELENGTH
+    experiment = VirtualExperiment(
+        protocol,
+        taken,
+        Source(
+            math.radians(source_radius),
+            taken.stability if source_stability is None else source_stability,
+            _polarization(source_polarization),
+        ),
+        AngleErrors(*map(math.radians, (angle_error, camera_error, zero_error, tilt_error))),
+        exposure=exposure if exposure in ("each", "common") else number(exposure, "--exposure"),
+        calibration=calibration,
+        patch=pixels,
+        wavelength=wavelength,
+        seed=seed,
+    )
+    for note in protocol.notes:
+        warn(note)
+    with progress_bar("Measuring") as progress:
+        measurement = experiment.measure(samples, progress=progress)
+    with progress_bar("Reducing") as progress:
+        write_measurement(measurement, output, progress=progress)
+    states = taken.polarimeter.size
+    print(f"{output}: {len(protocol)} geometries, {states} states, {len(samples)} sample(s), simulated")
+    print(
+        f"Reduce with: pbrdf reduce {output}/frames --polarimeter {output}/polarimeter.toml "
+        f"--angles {output}/angles.csv --regions {output}/regions.toml"
+    )
+
+
+def _with_bits(detector: Detector, bits: int) -> Detector:
+    """The same electrons over more or fewer digital numbers."""
+    finer = 2.0 ** (bits - detector.bits)
+    return replace(detector, bits=bits, gain=detector.gain / finer, offset=detector.offset * finer)
+
+
+def _protocol(
+    positions: str | None, sample_angles: str | None, table: Path | None, reference_angle: float
+) -> Protocol:
+    """The geometries that the options name."""
+    import numpy as np
+
+    from pbrdf.instruments.angle_table import read_angles
+    from pbrdf.instruments.goniometer import Protocol
+
+    if table is not None:
+        if positions is not None or sample_angles is not None:
+            raise PbrdfError("--angles holds every geometry: leave --positions and --sample-angles out")
+        return Protocol.from_angle_table(read_angles(table), reference_angle=reference_angle)
+    between = np.deg2rad(angles(positions or _POSITIONS, "--positions"))
+    turned = None if sample_angles is None else np.deg2rad(angles(sample_angles, "--sample-angles"))
+    return Protocol.in_plane(between, turned)
+
+
+def _polarization(text: str | None) -> tuple[float, float, float]:
+    if text is None:
+        return (0.0, 0.0, 0.0)
+    parts = text.split(",")
+    if len(parts) != 3:
+        raise PbrdfError(
+            f"--source-polarization {text!r}: give three numbers Q/I,U/I,V/I, for example 0.01,0,0"
+        )
+    q, u, v = (number(part, "--source-polarization") for part in parts)
+    return (q, u, v)

@@ -1,0 +1,167 @@
+"""``pbrdf plan``: the geometries that determine a model's parameters best."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from pbrdf.cli.console import output_console, progress_bar
+from pbrdf.cli.fit import Backend
+from pbrdf.cli.instruments import open_instrument
+from pbrdf.cli.sources import open_model
+from pbrdf.cli.values import number, numbers, require_folder_of
+from pbrdf.errors import PbrdfError
+
+__all__ = ["plan"]
+
+
+def plan(
+    source: Annotated[
+        str,
+        typer.Argument(
+            metavar="MODEL", help="The guess: a model's JSON file, the folder of a fit, or a bundled paint."
+        ),
+    ],
+    output: Annotated[
+        Path,
+        typer.Option(
+            "--output", "-o", help="The angle table to write; a picture of the same name goes beside it."
+        ),
+    ] = Path("plan.csv"),
+    budget: Annotated[int, typer.Option(help="Number of readings.", min=1)] = 63,
+    criterion: Annotated[
+        str, typer.Option(help="D: joint confidence region; A: mean square of the relative standard errors.")
+    ] = "D",
+    out_of_plane: Annotated[
+        bool,
+        typer.Option("--out-of-plane", help="Tilt the sample out of the plane of source and camera too."),
+    ] = False,
+    instrument: Annotated[
+        str | None,
+        typer.Option(
+            help="paper, conservative, sony_imx250mzr, or an instrument's TOML file.",
+            metavar="NAME|FILE",
+            show_default="paper",
+        ),
+    ] = None,
+    noise: Annotated[
+        str | None,
+        typer.Option(
+            help="Uncertainties as for `pbrdf fit` instead of an instrument, e.g. 0.02,0.001 or instrument:linear=1%.",
+            metavar="REL[,ABS]",
+        ),
+    ] = None,
+    uncertainty: Annotated[
+        str, typer.Option(help="How rough the guess is, relative: the plan then serves models about it.")
+    ] = "0%",
+    angle_error: Annotated[
+        float,
+        typer.Option(
+            help="Standard error of the sample angle (out of plane of its tilt too), degrees.", min=0.0
+        ),
+    ] = 0.0,
+    camera_positions: Annotated[
+        int | None, typer.Option(help="Use so many camera positions only.", show_default="any number", min=1)
+    ] = None,
+    repeats: Annotated[int, typer.Option(help="How often one geometry may be read.", min=1)] = 1,
+    fix: Annotated[
+        list[str] | None, typer.Option(help="Parameter that the fit will hold (repeatable).", metavar="NAME")
+    ] = None,
+    free: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Parameter that it will fit although held by default (repeatable).", metavar="NAME"
+        ),
+    ] = None,
+    parameter: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Count the error of this parameter only (repeatable).", metavar="NAME", show_default="all"
+        ),
+    ] = None,
+    weight: Annotated[
+        list[str] | None,
+        typer.Option(help="Criterion A: weight of a relative error (repeatable).", metavar="NAME=NUMBER"),
+    ] = None,
+    pixels: Annotated[int, typer.Option(help="Pixels that a reading averages.", min=1)] = 400,
+    smallest_bistatic: Annotated[
+        float, typer.Option(help="Smallest angle between source and camera, degrees.", min=0.1, max=170.0)
+    ] = 10.0,
+    largest_zenith: Annotated[
+        float,
+        typer.Option(help="Largest angle of source and camera to the normal, degrees.", min=1.0, max=89.0),
+    ] = 80.0,
+    seed: Annotated[int, typer.Option(help="Seed of the search.", min=0)] = 0,
+    backend: Backend = None,
+) -> None:
+    """Choose where to measure: the angles that determine the parameters best.
+
+    Prints the expected standard errors beside those of the paper's plan of 3 camera positions × 21 sample angles,
+    and writes an angle table for `pbrdf measure` and `pbrdf reduce` with a picture.
+
+    `pbrdf plan white --budget 40 --angle-error 0.05`
+
+    `pbrdf plan paint-fit --uncertainty 10% --camera-positions 3 -o next.csv`
+    """
+    import numpy as np
+
+    import pbrdf
+    from pbrdf.instruments.angle_table import write_angles
+    from pbrdf.inversion import candidates
+    from pbrdf.inversion.plan import plan as make_plan
+    from pbrdf.report.plan_figure import plan_figure
+    from pbrdf.report.plan_summary import print_plan
+    from pbrdf.report.style import save_figure
+
+    if noise is not None and instrument is not None:
+        raise PbrdfError("--noise and --instrument exclude each other: choose one")
+    if output.suffix.lower() != ".csv":
+        raise PbrdfError(f"--output {output}: the extension must be .csv")
+    require_folder_of(output)
+    if backend is not None:
+        pbrdf.set_backend(backend)
+    model = open_model(source)
+    taken = open_instrument(instrument or "paper") if noise is None else noise
+    choose = candidates.out_of_plane_candidates if out_of_plane else candidates.in_plane_candidates
+    with progress_bar("Planning") as progress:
+        made = make_plan(
+            model,
+            taken,
+            budget,
+            criterion=criterion,
+            candidates=choose(
+                model,
+                smallest_bistatic=math.radians(smallest_bistatic),
+                largest_zenith=math.radians(largest_zenith),
+            ),
+            parameters=parameter or None,
+            fix=fix or (),
+            free=free or (),
+            weights=numbers(weight or (), "--weight", "n=2"),
+            uncertainty=_share(uncertainty),
+            camera_positions=camera_positions,
+            repeats=repeats,
+            pixels=pixels,
+            angle_error=math.radians(angle_error),
+            seed=seed,
+            progress=progress,
+        )
+    picture = output.with_suffix(".png")
+    save_figure(plan_figure(made, Path(source).name), picture)
+    mounted = 0.0 if isinstance(taken, str) else taken.reference_angle
+    write_angles(made.protocol.angle_table(reference_angle=mounted), output)
+    print_plan(made, output_console())
+    print(f"\nWritten: {output}, {picture}")
+    if np.isinf(made.gain):
+        print("The plan 3 × 21 does not determine these parameters at all.")
+
+
+def _share(text: str) -> float:
+    """A part like 0.1 or 10%."""
+    stripped = text.strip()
+    if stripped.endswith("%"):
+        return number(stripped[:-1], "--uncertainty") / 100.0
+    return number(stripped, "--uncertainty")
