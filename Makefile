@@ -10,7 +10,7 @@ TEST_STAMP := $(VENV)/.installed-dev
 .PHONY: demo test lint benchmark clean
 
 demo: $(STAMP)
-	$(BIN)/pbrdf fit matte-white-thick --hold-out group=3 --output demo
+	$(BIN)/pbrdf reproduce --output demo
 
 test: $(TEST_STAMP)
 	$(BIN)/ruff check src tests benchmarks scripts

@@ -20,6 +20,7 @@ settings.register_profile(
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "suite"))
 
 ORACLE = Path(__file__).parent / "data_oracle"
+SHARED = Path(__file__).resolve().parents[2] / "shared" / "data"
 
 
 def read_oracle(name: str) -> dict[str, np.ndarray]:
@@ -67,3 +68,16 @@ def plain():
         return np.broadcast_to(x, (size,)).copy() if x.size == 1 else x
 
     return convert
+
+
+@pytest.fixture(scope="session")
+def measured():
+    """Path of a measured file that is not part of the repository; skips where it is absent."""
+
+    def find(name: str) -> Path:
+        path = SHARED / name
+        if not path.is_file():
+            pytest.skip(f"measured data absent: ../shared/data/{name} (not part of the repository)")
+        return path
+
+    return find

@@ -186,9 +186,21 @@ def test_nuisance_terms_and_noise_of_an_instrument(run, tmp_path):
     assert record["noise"].startswith("stated: instrument: 0.01")
 
 
+def test_joint_regions_are_drawn_where_asked_for(run, tmp_path):
+    result = run("fit", "cd-back", *STARTS, "--contour", "t,n", "--contour", "a, k", "-o", "out")
+    assert "contours.png" in result.stdout
+    assert (tmp_path / "out" / "contours.png").stat().st_size > 10_000
+    record = json.loads((tmp_path / "out" / "fit.json").read_text(encoding="utf-8"))
+    assert [c["parameters"] for c in record["checks"]["contours"]] == [["t", "n"], ["a", "k"]]
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
+        (("--contour", "t"), "--contour 't': give two different parameters, for example --contour t,n"),
+        (("--contour", "t,t"), "--contour 't,t': give two different"),
+        (("--contour", "t,m"), "'m' is not a free parameter of this fit: free are sigma, n, a, k, b, t"),
+        (("--contour", "t,n", "--fix", "n=1.6"), "'n' is not a free parameter"),
         (("--strategy", "guess"), "choose one of joint, stepwise"),
         (("--nuisance", "gains"), "choose one of gain, dark, angle, source"),
         (("--prior", "n=1.5"), "a prior is MEAN,STD"),

@@ -16,10 +16,16 @@ from typer.core import TyperGroup
 import pbrdf
 from pbrdf.cli.console import fail
 from pbrdf.cli.doctor import doctor
+from pbrdf.cli.export import export
 from pbrdf.cli.files import check, convert
 from pbrdf.cli.fit import fit
 from pbrdf.cli.lists import models, paints
+from pbrdf.cli.measure import measure
+from pbrdf.cli.plan import plan
 from pbrdf.cli.plot import plot
+from pbrdf.cli.reduce import reduce
+from pbrdf.cli.render import render
+from pbrdf.cli.reproduce import reproduce
 from pbrdf.cli.simulate import simulate
 from pbrdf.errors import PbrdfError
 
@@ -77,7 +83,13 @@ def options(
 
 app.command()(fit)
 app.command()(simulate)
+app.command()(reduce)
 app.command()(plot)
+app.command()(plan)
+app.command()(measure)
+app.command()(render)
+app.command()(reproduce)
+app.command()(export)
 app.command()(check)
 app.command()(convert)
 app.command()(paints)

@@ -1,0 +1,190 @@
+"""``pbrdf reduce``: raw frames of a polarimeter made into Stokes parameters, pictures and data sets."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from pbrdf.cli.console import output_console, progress_bar
+from pbrdf.cli.values import number, pairs
+from pbrdf.errors import PbrdfError
+
+if TYPE_CHECKING:
+    from pbrdf.instruments.instrument import Instrument
+    from pbrdf.instruments.regions import Region
+
+__all__ = ["reduce"]
+
+_UNITS = {"": 1, "K": 10**3, "M": 10**6, "G": 10**9, "T": 10**12}
+#: Less memory than this holds no block of a large picture.
+_LEAST_MEMORY = 1_000_000
+
+
+def reduce(
+    frames: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FRAMES",
+            help="Raw frames: a folder of PNG, TIFF or NPY files (one a state, called SERIES_STATE, or a folder a "
+            "series), a TIFF or NPY stack, netCDF, Zarr, or mosaic pictures.",
+        ),
+    ],
+    polarimeter: Annotated[
+        str, typer.Option("--polarimeter", "-p", help="The instrument's TOML file, or a built-in instrument.")
+    ],
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="Folder for the results.", show_default="<frames>-reduced"),
+    ] = None,
+    regions: Annotated[
+        Path | None,
+        typer.Option(help="Regions to average over: TOML, CSV, or a picture of labels.", metavar="FILE"),
+    ] = None,
+    roi: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="A region in pixels of the Stokes picture, columns and rows from the top left: paint=100:200,150:260, "
+            "disc=ellipse:X,Y,RX,RY or edge=polygon:X,Y,X,Y,X,Y (repeatable).",
+            metavar="NAME=X0:X1,Y0:Y1",
+        ),
+    ] = None,
+    angles: Annotated[
+        Path | None,
+        typer.Option(
+            help="CSV table of the angles of each series (series, theta_i, theta_r, phi; degrees): each region then "
+            "gives a data set that `pbrdf fit` reads.",
+            metavar="FILE",
+        ),
+    ] = None,
+    series: Annotated[
+        str | None, typer.Option(help="Take only these series, e.g. p1_01,p1_02.", metavar="NAMES")
+    ] = None,
+    maps: Annotated[str, typer.Option(help="Stokes parameters of every pixel: nc, zarr or none.")] = "nc",
+    datasets: Annotated[str, typer.Option(help="Format of the data sets: csv or nc.")] = "csv",
+    pictures: Annotated[
+        bool, typer.Option("--pictures/--no-pictures", help="Draw S0, DoLP and AoLP.")
+    ] = True,
+    weighted: Annotated[
+        bool,
+        typer.Option("--weighted/--unweighted", help="Weigh the states of a pixel by their noise, or alike."),
+    ] = True,
+    dark_level: Annotated[
+        float, typer.Option(help="Pixels whose mean signal is not above this count as dark, digital numbers.")
+    ] = 0.0,
+    max_memory: Annotated[
+        str, typer.Option(help="Memory for frames and what is computed from them, e.g. 200MB or 2GB.")
+    ] = "500MB",
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print the name of the folder only.")] = False,
+) -> None:
+    """Turn raw frames of a polarimeter into Stokes parameters with their uncertainty.
+
+    Writes a folder with summary.csv (means of regions), stokes.nc (every pixel), quick-look pictures, and with
+    --angles one data set for each region.
+
+    A mosaic camera: `pbrdf reduce picture.png -p sony_imx250mzr`
+
+    A measurement: `pbrdf reduce run/ -p imager.toml --angles angles.csv --roi paint=100:200,150:260`, then
+    `pbrdf fit run-reduced/paint.csv`
+    """
+    memory = memory_size(max_memory, "--max-memory")
+    if maps not in ("nc", "zarr", "none"):
+        raise PbrdfError(f"--maps {maps!r}: choose nc, zarr or none")
+    if datasets not in ("csv", "nc"):
+        raise PbrdfError(f"--datasets {datasets!r}: choose csv or nc")
+    from pbrdf.instruments.angle_table import read_angles
+    from pbrdf.instruments.frame_files import open_frames
+    from pbrdf.instruments.frames import ChosenSeries, Frames
+    from pbrdf.report.files import require_writable
+    from pbrdf.report.reduction_files import Wanted, write_reduction
+
+    if maps == "zarr":
+        from pbrdf.data.zarr_folder import require_zarr
+
+        require_zarr(Path("stokes.zarr"))
+    instrument = _instrument(polarimeter)
+    found: Frames = open_frames(frames, instrument)
+    table = None if angles is None else read_angles(angles)
+    if series is not None:
+        names = [name.strip() for name in series.split(",") if name.strip()]
+        found = ChosenSeries(found, names)
+        table = None if table is None else table.rows(names)
+    chosen = _regions(regions, roi or [])
+    if table is not None and not chosen:
+        raise PbrdfError(
+            f"--angles: say which part of the picture is the sample, for example "
+            f"--roi sample=0:{found.columns},0:{found.rows} for all of it"
+        )
+    plain = frames.resolve()
+    folder = output or Path(
+        f"{plain.name if plain.is_dir() and plain.suffix != '.zarr' else plain.stem}-reduced"
+    )
+    require_writable(folder)
+    wanted = Wanted(None if maps == "none" else maps, pictures, chosen, table, f".{datasets}")
+    with progress_bar(f"Reducing {frames}", quiet) as progress:
+        result = write_reduction(
+            found,
+            instrument,
+            folder,
+            wanted,
+            name=plain.name,
+            dark_level=dark_level,
+            weighted=weighted,
+            max_memory=memory,
+            progress=progress,
+        )
+    if quiet:
+        print(folder)
+        return
+    from pbrdf.report.reduction_summary import print_averages
+
+    console = output_console()
+    console.print(
+        f"{len(found.names)} series of {found.states} states, {found.columns} × {found.rows} pixels; "
+        f"{instrument.polarimeter.name}",
+        markup=False,
+    )
+    shown = {name: means for name, means in result.averages.items() if name in chosen} or result.averages
+    print_averages(shown, found.names, console)
+    console.print(f"\nWritten to {folder}/: {', '.join(path.name for path in result.files)}", markup=False)
+
+
+def _instrument(source: str) -> Instrument:
+    """An instrument from its file, or a built-in one where no file has that name."""
+    from pbrdf.instruments.instrument_files import load_instrument
+    from pbrdf.instruments.presets import PRESETS, preset
+
+    if source in PRESETS and not Path(source).exists():
+        return preset(source)
+    if not Path(source).suffix:
+        raise PbrdfError(
+            f"--polarimeter {source!r}: give a TOML file, or one of the built-in instruments {', '.join(PRESETS)}"
+        )
+    return load_instrument(source)
+
+
+def _regions(file: Path | None, texts: list[str]) -> dict[str, Region]:
+    from pbrdf.instruments.region_files import read_regions, region_from_text
+
+    found = {} if file is None else read_regions(file)
+    for name, text in pairs(texts, "--roi", "paint=100:200,150:260").items():
+        if name in found:
+            raise PbrdfError(f"--roi {name}: {file} has a region of that name too")
+        try:
+            found[name] = region_from_text(text)
+        except PbrdfError as error:
+            raise PbrdfError(f"--roi {name}: {error}") from error
+    return found
+
+
+def memory_size(text: str, option: str) -> int:
+    """Bytes from a text such as 200MB; raises PbrdfError if it is none or too little."""
+    match = re.fullmatch(r"([\d.]+)\s*([KMGT]?)B?", text.strip().upper())
+    if match is None:
+        raise PbrdfError(f"{option} {text!r}: give a size such as 200MB or 2GB")
+    size = int(number(match[1], option) * _UNITS[match[2]])
+    if size < _LEAST_MEMORY:
+        raise PbrdfError(f"{option} {text!r}: at least 1MB is needed")
+    return size

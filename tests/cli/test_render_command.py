@@ -1,0 +1,127 @@
+"""``pbrdf render``."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+pytest.importorskip("mitsuba", reason="rendering needs mitsuba: pip install 'pbrdf[render]'")
+
+SMALL = ("--size", "24x16", "--spp", "32", "--quiet")
+PAINT = {
+    "model": "double-gauss",
+    "parameters": {"sigma": 0.1, "n": 1.6, "a": 0.3, "k": 1.1, "b": 0.2, "t": 0.6},
+}
+
+
+@pytest.fixture
+def paint(tmp_path):
+    file = tmp_path / "paint.json"
+    file.write_text(json.dumps(PAINT))
+    return file.name
+
+
+def test_a_folder_holds_the_layers_and_the_pictures(run, tmp_path, paint):
+    result = run("render", paint, *SMALL, "--polarizer", 90, "-o", "out")
+    names = {path.name for path in (tmp_path / "out").iterdir()}
+    assert names == {"stokes.exr", "stokes.png", "s0.png", "dolp.png", "aolp.png", "polarizer_90.png"}
+    assert set(result.stdout.split("\n")[1:-1]) == {f"out/{name}" for name in names}
+    assert "Standard error of S0" in result.stdout
+    assert result.stderr == ""
+    from pbrdf.rendering.picture import read_exr
+
+    picture = read_exr(tmp_path / "out" / "stokes.exr")
+    assert picture.shape == (16, 24)
+    assert np.isfinite(picture.stokes).all()
+    assert picture.attrs["models"] == "paint.json"
+    assert picture.attrs["light"] == "sky"
+    assert 0.0 < np.nanmax(picture.dolp) <= 1.0
+
+
+def test_one_file_has_one_figure_beside_it(run, tmp_path, paint):
+    run("render", paint, paint, "--scene", "plate", "--light", "point", *SMALL, "-o", "row.exr")
+    assert {path.name for path in tmp_path.iterdir()} == {"row.exr", "row.png", paint}
+
+
+def test_the_folder_of_a_fit_stands_for_its_model(run, tmp_path, paint):
+    (tmp_path / "run").mkdir()
+    (tmp_path / paint).rename(tmp_path / "run" / "model.json")
+    run("render", "run", "--light", "constant", *SMALL, "-o", "fit.exr")
+    assert (tmp_path / "fit.exr").is_file()
+
+
+def test_paints_on_a_cameras_scale_are_told(run):
+    result = run("render", "white", "--light", "point", *SMALL)
+    assert "white reflects 1.78 of the light it gets" in result.stderr
+    assert "sphere-render/stokes.exr" in result.stdout
+
+
+def test_the_light_comes_from_where_it_is_said_to(run, tmp_path, paint):
+    """A lamp at azimuth 0° stands on the right of the picture: there the ball is bright, and on its left dark."""
+    from pbrdf.rendering.picture import read_exr
+
+    options = ("--light", "point", "--sun-zenith", 80, "--size", "40x40", "--spp", 16, "--quiet")
+    brighter = {}
+    for azimuth in (0, 180):
+        run("render", paint, *options, "--sun-azimuth", azimuth, "-o", "a.exr")
+        row = read_exr(tmp_path / "a.exr").stokes[0, 18:22]
+        brighter[azimuth] = (
+            row[:, 25:29].mean() > 3.0 * row[:, 11:15].mean(),
+            row[:, 11:15].mean() > 3.0 * row[:, 25:29].mean(),
+        )
+    assert brighter == {0: (True, False), 180: (False, True)}
+
+
+def test_a_scene_file_is_rendered_in_its_own_size(run, tmp_path, paint):
+    (tmp_path / "scene.xml").write_text(
+        """<scene version="3.0.0">
+        <sensor type="perspective">
+        <transform name="to_world"><lookat origin="0,-3,0" target="0,0,0" up="0,0,1"/></transform>
+        <film type="hdrfilm"><integer name="width" value="9"/><integer name="height" value="7"/>
+        <string name="pixel_format" value="luminance"/></film></sensor>
+        <shape type="sphere"><bsdf type="diffuse" id="paint"/></shape><emitter type="constant"/></scene>"""
+    )
+    run("render", paint, "--scene", "scene.xml", "--spp", 16, "--quiet", "-o", "own.exr")
+    from pbrdf.rendering.picture import read_exr
+
+    assert read_exr(tmp_path / "own.exr").shape == (7, 9)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((), "name at least one model"),
+        (("nothing.json",), "nothing.json: cannot be read as a model"),
+        (("PAINT", "--size", "24"), "--size '24': give WIDTHxHEIGHT"),
+        (("PAINT", "--size", "0x24"), "--size 0x24: width and height"),
+        (("PAINT", "--scene", "teapot"), "choose sphere, plate, car"),
+        (("PAINT", "--scene", "missing.xml"), "missing.xml"),
+        (("PAINT", "--light", "moon"), "choose one of point, area"),
+        (("PAINT", "--light", "envmap:missing.exr"), "there is no file missing.exr"),
+        (("PAINT", "--light", "point", "--max-dolp", "0.5"), "--max-dolp is for --light sky"),
+        (("PAINT", "--light", "constant", "--sun-zenith", "30"), "constant has no direction"),
+        (("PAINT", "--scene", "a.xml", "--light", "sky"), "brings its own lights: leave --light out"),
+        (("PAINT", "--polarizer", "nan"), "--polarizer: give an angle"),
+        (("PAINT", "--variant", "llvm_ad_rgb"), "only these carry polarisation"),
+        (("PAINT", "--depth", "0"), "use 1 or more"),
+        (("PAINT", "-o", "missing/out.exr"), "there is no folder missing"),
+        (("PAINT", "-o", "PAINT"), "choose another folder with --output"),
+        (("PAINT",) * 13, "1 to 12 models, not 13"),
+    ],
+)
+def test_what_cannot_be_rendered_is_one_line(refused, paint, arguments, message):
+    assert message in refused("render", *(paint if a == "PAINT" else a for a in arguments))
+
+
+def test_a_map_of_parameters_covers_the_surface(run, tmp_path):
+    """A model whose parameters are pictures: the plugin spreads them over the surface."""
+    maps = {**PAINT, "parameters": {**PAINT["parameters"], "a": [[0.02, 0.02], [0.6, 0.6]]}}
+    (tmp_path / "maps.json").write_text(json.dumps(maps))
+    run("render", "maps.json", "--scene", "plate", "--light", "constant", *SMALL, "-o", "maps.exr")
+    from pbrdf.rendering.picture import read_exr
+
+    column = read_exr(tmp_path / "maps.exr").stokes[0, :, 12]
+    on_panel = column[4:12]
+    assert math.isfinite(on_panel.sum())
+    assert on_panel.max() > 3.0 * on_panel.min()
