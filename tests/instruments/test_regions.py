@@ -174,6 +174,37 @@ def test_saturated_pixels_of_frames_never_enter():
     assert found.counts == {"good": 320, "saturated": 80, "dead": 0, "dark": 0}
 
 
+def test_a_dim_region_keeps_the_pixels_that_noise_has_made_dark():
+    """Light of a fifth of the noise: nearly half of the pixels are dark, and the mean is right only with them."""
+    detector = Detector(bits=12, gain=2.0, read_noise=8.0, offset=100.0)
+    instrument = Instrument(PLAIN.polarimeter, detector)
+    truth = np.array([0.8, 0.2, -0.1, 0.1])
+    light = PLAIN.polarimeter.intensities(np.repeat(truth[:, None], 20_000, axis=1))
+    image = reduce_frames(detector.expose(light, np.random.default_rng(3)), PLAIN.polarimeter, detector)
+    assert image.counts()["dark"] > 6000
+    found = average(image, instrument=instrument)
+    assert found.counts == {"good": 20_000, "saturated": 0, "dead": 0, "dark": 0}
+    assert np.abs((found.stokes - truth) / np.sqrt(np.diag(found.covariance))).max() < 4.0
+    # the bright pixels alone are far off
+    assert average(image, image.flags == 0, instrument).stokes[0] > 3.0 * truth[0]
+
+
+def test_shadows_in_a_bright_region_are_left_out():
+    detector = Detector(bits=12, gain=2.0, read_noise=8.0, offset=100.0)
+    light = PLAIN.polarimeter.intensities(np.repeat([[400.0], [20.0], [0.0], [0.0]], 1000, axis=1))
+    light[:, ::4] = 0.0
+    image = reduce_frames(detector.expose(light, np.random.default_rng(3)), PLAIN.polarimeter, detector)
+    shadow = image.flags == PixelFlag.DARK
+    assert 80 < shadow.sum() < 250
+    # shadows that noise has made brighter than black cannot be told from dim light: a dark level leaves them out
+    level = reduce_frames(
+        detector.expose(light, np.random.default_rng(3)), PLAIN.polarimeter, detector, dark_level=40.0
+    )
+    found = average(level, instrument=Instrument(PLAIN.polarimeter, detector))
+    assert found.counts == {"good": 750, "saturated": 0, "dead": 0, "dark": 250}
+    assert found.stokes[0] == pytest.approx(400.0, abs=2.0)
+
+
 def test_added_in_parts_it_is_the_same():
     draw = np.random.default_rng(8)
     stokes = draw.normal(5000.0, 1.0, (4, 30, 20))

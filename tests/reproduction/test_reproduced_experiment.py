@@ -75,7 +75,7 @@ def test_errors_of_the_calibration_are_in_the_uncertainties():
 
 
 def test_a_seed_fixes_everything_and_samples_have_noise_of_their_own():
-    first, again, other = (measured_samples(Options(patch=2, seed=s)) for s in (1, 1, 2))
+    first, again, other = (measured_samples(Options(patch=8, seed=s)) for s in (1, 1, 2))
     for name in SAMPLES:
         np.testing.assert_array_equal(first[name]["I"], again[name]["I"])
         assert (first[name]["I"].values != other[name]["I"].values).any()

@@ -32,7 +32,9 @@ class StokesImage:
     Attributes
     ----------
     stokes
-        I, Q, U, V in digital numbers, shape (4, ...); NaN where a component is not determined or the pixel is bad.
+        I, Q, U, V in digital numbers, shape (4, ...); NaN where a component is not determined or the pixel is
+        saturated or dead. Dark pixels keep their values, noise about zero: a region that is dim as a whole needs them,
+        as its mean would come out too bright without those that noise has made dark.
     covariance
         Shape (4, 4, ...), noise of the detector only; NaN likewise.
     flags
@@ -203,10 +205,12 @@ def reduce_frames(
             )
         analyzer = polarimeter.spread(*shape) if polarimeter.is_map else polarimeter.analyzer
     flags = flag_pixels(frames, detector, dead=dead, dark_level=dark_level, black=black)
-    bad = (flags != 0).ravel()
     raw = frames.reshape(len(frames), -1)
     level = _of_pixels("the black level", detector.black if black is None else black, frames.shape)
     response = _of_pixels("the flat field", 1.0 if flat is None else flat, frames.shape)
+    # a dark pixel is solved for where that is possible
+    solved = (flags == 0) | ((flags == PixelFlag.DARK) & (response > 0.0).all(axis=0).reshape(shape))
+    bad = ~solved.ravel()
     extra = _of_pixels("the extra variance", 0.0 if extra_variance is None else extra_variance, frames.shape)
     W = analyzer.reshape(-1, *analyzer.shape[-2:]) if analyzer.ndim > 2 else analyzer
     stokes = np.empty((4, bad.size))

@@ -32,6 +32,9 @@ __all__ = [
 
 _BAD = (PixelFlag.SATURATED, PixelFlag.DEAD, PixelFlag.DARK)
 
+#: A region is dim if its pixels are on average not this many standard deviations of their noise above zero.
+_DIM = 5.0
+
 
 class Region(Protocol):
     """Part of a picture."""
@@ -197,6 +200,9 @@ def rows_of(regions: Mapping[str, Region]) -> tuple[int, int]:
 class RegionAverage:
     """Mean over the good pixels of a region.
 
+    Dark pixels are left out where the region is bright: they are shadows or defects. Where the region as a whole is so
+    dim that noise alone makes pixels dark, they are part of the mean; without them it would be too bright.
+
     Attributes
     ----------
     stokes
@@ -211,7 +217,8 @@ class RegionAverage:
     pixels
         Number of pixels of the region.
     counts
-        Of good, saturated, dead and dark pixels; a pixel may be counted in several of the last three.
+        Of averaged ("good"), saturated, dead and dark pixels; a pixel may be counted in several of the last three, and
+        dark ones that are averaged are good, not dark.
     """
 
     stokes: np.ndarray
@@ -222,16 +229,68 @@ class RegionAverage:
     counts: dict[str, int]
 
 
+class _PixelSum:
+    """Sums over pixels, about a value near their mean so that squares do not lose their digits."""
+
+    def __init__(self) -> None:
+        self.count = 0
+        self.origin: np.ndarray | None = None
+        self.stokes = np.zeros(4)
+        self.squares = np.zeros(4)
+        self.covariance = np.zeros((4, 4))
+
+    def add(self, stokes: np.ndarray, covariance: np.ndarray) -> None:
+        """Add pixels, shapes (4, P) and (16, P)."""
+        if not stokes.shape[1]:
+            return
+        if self.origin is None:
+            self.origin = np.nan_to_num(stokes[:, 0])
+        away = stokes - self.origin[:, None]
+        self.count += stokes.shape[1]
+        self.stokes += away.sum(axis=1)
+        self.squares += np.einsum("kp,kp->k", away, away)
+        self.covariance += covariance.sum(axis=1).reshape(4, 4)
+
+    def joined(self, other: _PixelSum) -> _PixelSum:
+        """The sums over the pixels of both."""
+        if self.origin is None or other.origin is None:
+            return other if self.origin is None else self
+        found = _PixelSum()
+        shift = other.origin - self.origin
+        found.count, found.origin = self.count + other.count, self.origin
+        found.stokes = self.stokes + other.stokes + other.count * shift
+        found.squares = self.squares + other.squares + 2.0 * shift * other.stokes + other.count * shift**2
+        found.covariance = self.covariance + other.covariance
+        return found
+
+    @property
+    def mean(self) -> np.ndarray:
+        """Mean Stokes vector, shape (4,)."""
+        assert self.origin is not None
+        return self.origin + self.stokes / self.count
+
+    @property
+    def scatter(self) -> np.ndarray:
+        """Standard deviation of the pixels, shape (4,); NaN for one."""
+        if self.count < 2:
+            return np.full(4, np.nan)
+        squares = self.squares - self.stokes**2 / self.count
+        return np.sqrt(np.maximum(squares, 0.0) / (self.count - 1))
+
+    @property
+    def dim(self) -> bool:
+        """Whether noise alone can make such pixels dark."""
+        return bool(self.mean[0] < _DIM * np.sqrt(self.covariance[0, 0] / self.count))
+
+
 class RegionSum:
-    """Sums over the good pixels of a region, to which blocks of a picture are added one after another."""
+    """Sums over the pixels of a region, to which blocks of a picture are added one after another."""
 
     def __init__(self) -> None:
         self.pixels = 0
-        self.counts = {"good": 0, **{str(flag.name).lower(): 0 for flag in _BAD}}
-        self._stokes = np.zeros(4)
-        self._squares = np.zeros(4)
-        self._covariance = np.zeros((4, 4))
-        self._origin: np.ndarray | None = None
+        self._flagged = {str(flag.name).lower(): 0 for flag in _BAD}
+        self._good = _PixelSum()
+        self._dark = _PixelSum()
 
     def add(self, image: StokesImage, mask: np.ndarray | None = None) -> None:
         """Add the pixels of some rows that the mask (bool, shape of the rows; all without it) takes in."""
@@ -242,46 +301,33 @@ class RegionSum:
         covariance = (
             image.covariance.reshape(16, -1) if mask is None else image.covariance[:, :, mask].reshape(16, -1)
         )
-        good = flags == 0
         self.pixels += flags.size
-        self.counts["good"] += int(good.sum())
         for flag in _BAD:
-            self.counts[str(flag.name).lower()] += int((flags & flag != 0).sum())
-        if not good.any():
+            self._flagged[str(flag.name).lower()] += int((flags & flag != 0).sum())
+        good = flags == 0
+        if good.all():
+            self._good.add(stokes, covariance)
             return
-        if not good.all():
-            stokes, covariance = stokes[:, good], covariance[:, good]
-        if self._origin is None:
-            # squares about a value near the mean do not lose their digits
-            self._origin = np.nan_to_num(stokes[:, 0])
-        away = stokes - self._origin[:, None]
-        self._stokes += away.sum(axis=1)
-        self._squares += np.einsum("kp,kp->k", away, away)
-        self._covariance += covariance.sum(axis=1).reshape(4, 4)
+        self._good.add(stokes[:, good], covariance[:, good])
+        dark = (flags == PixelFlag.DARK) & np.isfinite(stokes[0])
+        self._dark.add(stokes[:, dark], covariance[:, dark])
 
     def average(self, instrument: Instrument) -> RegionAverage:
         """Mean and its covariance, with the accuracy and stability of the instrument."""
-        count = self.counts["good"]
-        if not count:
+        used, flagged = self._good, dict(self._flagged)
+        if used.count and self._dark.count:
+            everything = used.joined(self._dark)
+            if everything.dim:
+                used = everything
+                flagged["dark"] -= self._dark.count
+        counts = {"good": used.count, **flagged}
+        if not used.count:
             nothing = np.full((4, 4), np.nan)
-            return RegionAverage(
-                nothing[0], nothing, nothing.copy(), nothing[0].copy(), self.pixels, dict(self.counts)
-            )
-        assert self._origin is not None
-        mean = self._stokes / count
-        squares = self._squares - count * mean**2
-        with np.errstate(divide="ignore", invalid="ignore"):
-            scatter = np.sqrt(np.maximum(squares, 0.0) / (count - 1)) if count > 1 else np.full(4, np.nan)
-        stokes = self._origin + mean
-        noise = self._covariance / count**2
+            return RegionAverage(nothing[0], nothing, nothing.copy(), nothing[0].copy(), self.pixels, counts)
+        stokes = used.mean
         analyzer = instrument.polarimeter.analyzer
         analyzer = analyzer.mean(axis=(0, 1)) if analyzer.ndim == 4 else analyzer
-        noise = noise + rounding_covariance(instrument, analyzer @ np.nan_to_num(stokes), count)
-        return RegionAverage(
-            stokes,
-            noise + systematic_covariance(instrument, stokes),
-            noise,
-            scatter,
-            self.pixels,
-            dict(self.counts),
-        )
+        noise = used.covariance / used.count**2
+        noise = noise + rounding_covariance(instrument, analyzer @ np.nan_to_num(stokes), used.count)
+        covariance = noise + systematic_covariance(instrument, stokes)
+        return RegionAverage(stokes, covariance, noise, used.scatter, self.pixels, counts)

@@ -76,12 +76,15 @@ def pixel_maps(image: StokesImage, names: Sequence[str]) -> dict[str, np.ndarray
     dict of str to ndarray
         By the name of the variable, float32 but for the flags, angles in degrees, shape (rows, columns).
     """
-    found = polarization(image.stokes, image.covariance)
+    good = image.flags == 0
+    stokes = np.where(good, image.stokes, np.nan)
+    covariance = np.where(good, image.covariance, np.nan)
+    found = polarization(stokes, covariance)
     values = {
-        **dict(zip(STOKES, image.stokes, strict=True)),
-        **{name: image.covariance[i, j] for (i, j), name in COVARIANCES.items()},
+        **dict(zip(STOKES, stokes, strict=True)),
+        **{name: covariance[i, j] for (i, j), name in COVARIANCES.items()},
         "dolp": found.dolp,
-        "dolp_debiased": debiased_dolp(image.stokes, image.covariance),
+        "dolp_debiased": debiased_dolp(stokes, covariance),
         "dolp_std": found.dolp_std,
         "aolp": np.rad2deg(found.aolp),
         "aolp_std": np.rad2deg(found.aolp_std),

@@ -29,8 +29,6 @@ __all__ = ["Options", "measured_samples"]
 _POSITIONS = 3
 #: The detector's full range, electrons, and its black level in units of the range: they stay when the bits change.
 _RANGE, _BLACK = 80.0 * 256.0, 1.0 / 256.0
-#: No pixel is left out for being dark: a threshold would keep the ones that noise has made brighter.
-_NEVER_DARK = -math.inf
 
 
 @dataclass(frozen=True)
@@ -186,7 +184,6 @@ def measured_samples(
             instrument,
             measurement.regions,
             measurement.angles,
-            dark_level=_NEVER_DARK,
             simulated=True,
             attrs=attrs,
         )
