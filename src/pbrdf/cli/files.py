@@ -39,11 +39,11 @@ def check(
 @with_reading_options
 def convert(
     file: Annotated[str, typer.Argument(metavar="IN", help="File of measured data, or a bundled paint.")],
-    output: Annotated[Path, typer.Argument(metavar="OUT", help="New file: .csv or .nc.")],
+    output: Annotated[Path, typer.Argument(metavar="OUT", help="New file: .csv, .nc or .zarr.")],
     *,
     reading: Reading,
 ) -> None:
-    """Write a file of data in the project's own CSV or netCDF form."""
+    """Write a file of data in the project's own CSV, netCDF or Zarr form."""
     from pbrdf.data import write
 
     require_folder_of(output)

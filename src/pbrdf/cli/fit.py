@@ -115,6 +115,13 @@ def fit(
     profile: Annotated[
         bool, typer.Option("--profile", help="Profile-likelihood intervals too: asymmetric, right at bounds.")
     ] = False,
+    contour: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Draw the joint confidence regions of two parameters, e.g. t,n (repeatable).",
+            metavar="NAME,NAME",
+        ),
+    ] = None,
     bootstrap: Annotated[
         int, typer.Option(help="Simulated data sets for bootstrap intervals; 0 for none.", min=0)
     ] = 0,
@@ -144,7 +151,7 @@ def fit(
     """Fit a model to measured data, and say how well each parameter is known.
 
     Writes a folder with summary.txt, figure.png, model.json, fit.json (all numbers), comparison.nc
-    (measured, modelled, residual) and starts.png.
+    (measured, modelled, residual) and starts.png, and with --contour contours.png.
 
     With bundled data: `pbrdf fit matte-white-thick --hold-out group=3`
 
@@ -177,6 +184,7 @@ def fit(
         "loss": loss,
         "seed": seed,
     }
+    pairs_drawn = [_pair(text) for text in contour or ()]
     folders = _folders(files, output)
     for folder in folders:
         require_writable(folder)
@@ -199,6 +207,7 @@ def fit(
                     profile=profile,
                     bootstrap=bootstrap,
                     cross_validate=cross_validate,
+                    contours=pairs_drawn,
                     fit_arguments={
                         "model": chosen,
                         **{k: v for k, v in arguments.items() if k != "hold_out"},
@@ -224,6 +233,14 @@ def _prior(name: str, text: str) -> tuple[float, float]:
     from pbrdf.inversion.nuisance import parse_prior
 
     return parse_prior(f"--prior {name}", text)
+
+
+def _pair(text: str) -> tuple[str, str]:
+    """Names of two parameters."""
+    names = [name.strip() for name in text.split(",")]
+    if len(names) != 2 or not all(names) or names[0] == names[1]:
+        raise PbrdfError(f"--contour {text!r}: give two different parameters, for example --contour t,n")
+    return names[0], names[1]
 
 
 def _folders(files: list[str], output: Path | None) -> list[Path]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from pbrdf.cli.fit import Backend
+from pbrdf.cli.sources import known_wavelength, open_single_model
 from pbrdf.cli.values import angles, require_folder_of, stokes_vector
 from pbrdf.errors import PbrdfError
 
@@ -17,9 +18,10 @@ if TYPE_CHECKING:
 
     from pbrdf.models import Model
 
-__all__ = ["simulate"]
+__all__ = ["GRID", "directions_of", "simulate"]
 
-_GRID = {"theta_i": "10:80:10", "theta_r": "0:85:5", "phi": "0:360:15"}
+#: Directions over the hemisphere, degrees.
+GRID = {"theta_i": "10:80:10", "theta_r": "0:85:5", "phi": "0:360:15"}
 _PLANE_THETA_R = "-85:85:1"
 #: A relative noise alone.
 _PLAIN_NUMBER = re.compile(r"\s*[\d.eE+-]+\s*%?\s*")
@@ -29,21 +31,24 @@ _MOST_GEOMETRIES = 20_000_000
 
 
 def simulate(
-    source: Annotated[str, typer.Argument(metavar="MODEL", help="A model's JSON file, or a bundled paint.")],
+    source: Annotated[
+        str,
+        typer.Argument(metavar="MODEL", help="A model's JSON file, the folder of a fit, or a bundled paint."),
+    ],
     output: Annotated[Path, typer.Option("--output", "-o", help="The new file: .nc or .csv.")],
     theta_i: Annotated[
         str | None,
-        typer.Option(help="Angles of incidence: START:STOP:STEP or a list.", show_default=_GRID["theta_i"]),
+        typer.Option(help="Angles of incidence: START:STOP:STEP or a list.", show_default=GRID["theta_i"]),
     ] = None,
     theta_r: Annotated[
         str | None,
         typer.Option(
             help="Viewing angles; with --plane and --bistatic negative ones are on the source's side.",
-            show_default=f"{_GRID['theta_r']}; in plane {_PLANE_THETA_R}",
+            show_default=f"{GRID['theta_r']}; in plane {_PLANE_THETA_R}",
         ),
     ] = None,
     phi: Annotated[
-        str | None, typer.Option(help="Azimuths, 0 in the forward half-plane.", show_default=_GRID["phi"])
+        str | None, typer.Option(help="Azimuths, 0 in the forward half-plane.", show_default=GRID["phi"])
     ] = None,
     plane: Annotated[bool, typer.Option("--plane", help="Stay in the plane of incidence.")] = False,
     bistatic: Annotated[
@@ -74,13 +79,9 @@ def simulate(
 
     A measurement: `pbrdf simulate model.json --bistatic 60,80,100 --noise 0.01 -o run.csv`
     """
-    import numpy as np
-
     import pbrdf
     from pbrdf.data import write
-    from pbrdf.data.paints import PAINTS, WAVELENGTH, load_paint
     from pbrdf.inversion.noise import parse_noise
-    from pbrdf.models import load_model
 
     if plane and bistatic is not None:
         raise PbrdfError("--plane and --bistatic exclude each other: choose one")
@@ -100,15 +101,12 @@ def simulate(
     stated = None if noise is None else parse_noise(f"{noise},0" if _PLAIN_NUMBER.fullmatch(noise) else noise)
     if backend is not None:
         pbrdf.set_backend(backend)
-    bundled = source in PAINTS and not Path(source).exists()
-    model = load_paint(source) if bundled else load_model(source)
-    if any(np.ndim(value) for value in model.values.values()):
-        raise PbrdfError(f"{source}: its parameters are arrays; give a model with single numbers")
+    model = open_single_model(source)
 
-    directions = _directions(theta_i, theta_r, phi, plane, bistatic)
+    directions = directions_of(theta_i, theta_r, phi, plane, bistatic)
     columns, std = _evaluate(model, directions, light, mueller, stated, seed)
-    if wavelength is None and bundled:
-        wavelength = WAVELENGTH
+    if wavelength is None:
+        wavelength = known_wavelength(source)
     dataset = pbrdf.make_dataset(
         directions["theta_i"],
         directions["theta_r"],
@@ -130,7 +128,7 @@ def simulate(
     print(f"{output}: {dataset.sizes['geometry']} geometries, simulated")
 
 
-def _directions(
+def directions_of(
     theta_i: str | None, theta_r: str | None, phi: str | None, plane: bool, bistatic: str | None
 ) -> dict[str, np.ndarray]:
     """Angles in radians and groups of every geometry, shape (N,)."""
@@ -146,9 +144,9 @@ def _directions(
         if not seen.any():
             raise PbrdfError("--bistatic: with these viewing angles the source is never between 0° and 90°")
         return _checked(incidence[seen], np.abs(s[seen]), np.where(s[seen] < 0.0, 180.0, 0.0), group[seen])
-    incidences = angles(theta_i or _GRID["theta_i"], "--theta-i")
-    views = angles(theta_r or (_PLANE_THETA_R if plane else _GRID["theta_r"]), "--theta-r")
-    azimuths = [0.0] if plane else angles(phi or _GRID["phi"], "--phi")
+    incidences = angles(theta_i or GRID["theta_i"], "--theta-i")
+    views = angles(theta_r or (_PLANE_THETA_R if plane else GRID["theta_r"]), "--theta-r")
+    azimuths = [0.0] if plane else angles(phi or GRID["phi"], "--phi")
     count = len(incidences) * len(views) * len(azimuths)
     if count > _MOST_GEOMETRIES:
         raise PbrdfError(

@@ -264,7 +264,7 @@ def _lane_groups(piece: dict[str, Any], size: int, model: Model, part: str) -> l
 
     None stands for all directions in their order.
     """
-    if part == "specular" or model.chosen["accuracy"] == "high":
+    if part == "specular" or model.chosen["accuracy"] in ("high", "fast"):
         return [None]
     sigma = np.asarray(piece["sigma"])
     # zenith angle up to which the edge of the wedge lies farther out than CLEAR_WEDGE

@@ -11,12 +11,14 @@ from typing import Any
 
 import drjit as dr
 
+from pbrdf.optics.powers import power
+
 __all__ = ["minnaert_shape", "mrpv"]
 
 
 def minnaert_shape(cos_i: Any, cos_r: Any, k: Any) -> Any:
     """W = [(μ_r + μ_i) μ_r μ_i]^(k−1); the cosines must be positive."""
-    return dr.exp((k - 1.0) * dr.log((cos_r + cos_i) * cos_r * cos_i))
+    return power((cos_r + cos_i) * cos_r * cos_i, k - 1.0)
 
 
 def mrpv(cos_i: Any, cos_r: Any, cos_scattering: Any, a: Any, k: Any, b: Any) -> Any:

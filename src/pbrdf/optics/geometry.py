@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import drjit as dr
 
-__all__ = ["Geometry", "Vector", "cross", "dot", "geometry_from_angles"]
+__all__ = ["Geometry", "Vector", "cross", "dot", "geometry_from_angles", "geometry_from_sines"]
 
 Vector = tuple[Any, Any, Any]
 
@@ -80,13 +80,27 @@ def geometry_from_angles(theta_i: Any, theta_r: Any, phi: Any) -> Geometry:
     phi
         Relative azimuth in radians, 0 in the forward half-plane.
     """
-    sin_i, cos_i = dr.sincos(theta_i)
-    sin_r, cos_r = dr.sincos(theta_r)
-    sin_phi, cos_phi = dr.sincos(phi)
+    return geometry_from_sines(*dr.sincos(theta_i), *dr.sincos(theta_r), *dr.sincos(phi))
+
+
+def geometry_from_sines(
+    sin_i: Any,
+    cos_i: Any,
+    sin_r: Any,
+    cos_r: Any,
+    sin_phi: Any,
+    cos_phi: Any,
+    h: Vector | None = None,
+) -> Geometry:
+    """Build the vectors of a geometry from sines and cosines of θ_i, θ_r and φ (both θ below π/2).
+
+    The sum ``h`` = ω_i + ω_r may be given where it is known more exactly than it follows from these numbers.
+    """
     zero = dr.zeros(type(sin_i), dr.width(sin_i)) if dr.is_jit_v(sin_i) else 0.0
     omega_i = (-sin_i, zero, cos_i)
     omega_r = (sin_r * cos_phi, sin_r * sin_phi, cos_r)
-    h = (omega_i[0] + omega_r[0], omega_r[1], cos_i + cos_r)
+    if h is None:
+        h = (omega_i[0] + omega_r[0], omega_r[1], cos_i + cos_r)
     inverse = dr.rsqrt(dot(h, h))
     facet = (h[0] * inverse, h[1] * inverse, h[2] * inverse)
     return Geometry(

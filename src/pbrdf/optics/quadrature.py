@@ -26,8 +26,9 @@ from typing import Any, NamedTuple
 import drjit as dr
 
 from pbrdf.optics.geometry import Geometry
+from pbrdf.optics.transport import transported_rows
 
-__all__ = ["ACCURACIES", "CLEAR_WEDGE", "facet_average", "needs_wedge", "wedge_distance"]
+__all__ = ["ACCURACIES", "CLEAR_WEDGE", "facet_average", "needs_wedge", "table", "wedge_distance"]
 
 #: Distance, in standard deviations of slope, beyond which the edge of the lit and seen wedge is ignored.
 CLEAR_WEDGE = 4.5
@@ -50,11 +51,13 @@ class _Accuracy(NamedTuple):
     clear: bool = True
 
 
-#: ``draft`` is for searching (errors up to 1 % where the wedge cuts in), ``high`` for reference values.
-ACCURACIES: dict[str, _Accuracy] = {
+#: ``draft`` is for searching (errors up to 1 % where the wedge cuts in), ``high`` for reference values, ``fast``
+#: for rendering: a rule of its own, see :mod:`pbrdf.optics.transport`.
+ACCURACIES: dict[str, _Accuracy | None] = {
     "default": _Accuracy(0.8, 7, 2.0),
     "high": _Accuracy(0.3, 24, 4.0, clear=False),
     "draft": _Accuracy(1.5, 3, 1.3),
+    "fast": None,
 }
 
 
@@ -83,6 +86,14 @@ def _clear_rules() -> tuple[list[float], list[float], list[float]]:
 _RULES = _clear_rules()
 
 
+def table(F: type, column: list[float]) -> Callable[..., Any]:
+    """Numbers to look up by index: a function of the index and, if not always wanted, of a mask."""
+    if F is float:
+        return lambda index, active=True: column[index]
+    values = F(column)
+    return lambda index, active=True: dr.gather(F, values, index, active)
+
+
 def wedge_distance(cos_theta: Any, sin_theta: Any, sigma: Any) -> Any:
     """Distance of the edge of the lit (or seen) half-plane from the origin, cotθ/σ, at most 50."""
     return cos_theta / dr.maximum(sigma * sin_theta, cos_theta / _FAR)
@@ -90,7 +101,7 @@ def wedge_distance(cos_theta: Any, sin_theta: Any, sigma: Any) -> Any:
 
 def needs_wedge(c_i: Any, c_r: Any, sigma: Any) -> Any:
     """Tell where the default accuracy takes the mapped wedge instead of a small cubature."""
-    return ~((dr.minimum(c_i, c_r) > CLEAR_WEDGE) & (sigma <= SIGMA_25))
+    return (dr.minimum(c_i, c_r) <= CLEAR_WEDGE) | (sigma > SIGMA_25)
 
 
 def facet_average(
@@ -141,8 +152,11 @@ def facet_average(
         values = integrand(m, mu_i, mu_r, geometry, args)
         return [dr.fma(weight, value, t) for value, t in zip(values, total, strict=True)]
 
-    # the rule enters as opaque data, so that all accuracies share one kernel
     rule = ACCURACIES[accuracy]
+    if rule is None:
+        return _transported_average(integrand, size, geometry, sigma, c_i, c_r, args)
+
+    # the rule enters as opaque data, so that the accuracies share one kernel
     step, steepness = dr.opaque(F, rule.step), dr.opaque(F, rule.steepness)
     flatness = dr.rcp(steepness)
     half, axis_nodes = dr.opaque(F, float(rule.half)), dr.opaque(UInt, 2 * rule.half + 1)
@@ -150,10 +164,10 @@ def facet_average(
     narrow = sigma <= SIGMA_12
     offset = dr.select(narrow, UInt(0), UInt(3))
     count = dr.select(wedge_lanes, UInt(0), dr.select(narrow, UInt(3), UInt(7)))
-    nodes = [F(column) for column in _RULES]
+    nodes = [table(F, column) for column in _RULES]
 
     def clear_body(j: Any, total: Any, sigma: Any, geometry: Any, args: Any) -> tuple[Any, ...]:
-        x, y, weight = (dr.gather(F, column, offset + j, j < count) for column in nodes)
+        x, y, weight = (node(offset + j, j < count) for node in nodes)
         mx, my = x * sigma, y * sigma
         inverse = dr.rsqrt(dr.fma(mx, mx, dr.fma(my, my, 1.0)))
         mx, my = mx * inverse, my * inverse
@@ -233,23 +247,64 @@ def _squeeze_between(z: Any, low: Any, high: Any, steepness: Any, flatness: Any)
     return z + bend * flatness, inside * ratio / one_below
 
 
-def _wedge_axes(geometry: Geometry, c_i: Any, c_r: Any) -> tuple[Any, ...]:
-    """Outer axis f, inner axis e, outer limit and the inner limits (constant, slope in the outer variable).
+def _transported_average(
+    integrand: Callable[..., tuple[Any, ...]],
+    size: int,
+    geometry: Geometry,
+    sigma: Any,
+    c_i: Any,
+    c_r: Any,
+    args: tuple[Any, ...],
+) -> list[Any]:
+    """Average with the few nodes of :mod:`pbrdf.optics.transport`."""
+    total: list[Any] = [0.0] * size
+    cos_phi, sin_phi = -geometry.s_r[1], geometry.s_r[0]
+    across = dr.abs(sin_phi)
+    turned_cosine = dr.select(sin_phi < 0.0, -cos_phi, cos_phi)
+    for row in transported_rows(c_r, c_i, -cos_phi, across):
+        u = sigma * row.u
+        length2 = dr.fma(u, u, 1.0)
+        # one exit angle for the whole row, that of the mean square across
+        mu_r = dr.fma(-u, geometry.sin_r, geometry.cos_r) * dr.rsqrt(dr.fma(sigma, sigma, length2))
+        mu_r = dr.maximum(mu_r, 1e-6)
+        for v, weight in row.nodes:
+            v = sigma * v
+            x, y = dr.fma(-u, cos_phi, across * v), dr.fma(-u, sin_phi, -turned_cosine * v)
+            inverse = dr.rsqrt(dr.fma(v, v, length2))
+            mu_i = dr.maximum(inverse * dr.fma(-x, geometry.sin_i, geometry.cos_i), 1e-6)
+            values = integrand((x * inverse, y * inverse, inverse), mu_i, mu_r, geometry, args)
+            total = [dr.fma(weight, value, t) for value, t in zip(values, total, strict=True)]
+    return total
+
+
+def _nearer_edge_axes(geometry: Geometry, c_i: Any, c_r: Any) -> tuple[Any, ...]:
+    """Axes across and along the nearer edge, distances of both edges, and the angle between their normals.
 
     Lit: a_i·z < c_i with a_i = (1, 0); seen: a_r·z < c_r with a_r = −(cosφ, sinφ).
+
+    Returns
+    -------
+    (f, e), c_near, c_far, cos_d, sin_d
+        As :func:`pbrdf.optics.transport.transported_nodes` takes them.
     """
+    cos_phi, sin_phi = -geometry.s_r[1], geometry.s_r[0]
+    nearer_i = c_i <= c_r
+    f = (dr.select(nearer_i, 1.0, -cos_phi), dr.select(nearer_i, 0.0, -sin_phi))
+    # e = ±(−f_y, f_x), the sign such that the farther edge bounds it from above
+    turn = dr.select((sin_phi > 0.0) == nearer_i, -1.0, 1.0)
+    e = (-turn * f[1], turn * f[0])
+    return (f, e), dr.minimum(c_i, c_r), dr.maximum(c_i, c_r), -cos_phi, dr.abs(sin_phi)
+
+
+def _wedge_axes(geometry: Geometry, c_i: Any, c_r: Any) -> tuple[Any, ...]:
+    """Outer axis f, inner axis e, outer limit and the inner limits (constant, slope in the outer variable)."""
     cos_phi, sin_phi = -geometry.s_r[1], geometry.s_r[0]
     cos_d = -cos_phi  # a_i·a_r
     same_side = cos_d >= 0.0
 
     # same side: f across the nearer edge
-    nearer_i = c_i <= c_r
-    c_near, c_far = dr.minimum(c_i, c_r), dr.maximum(c_i, c_r)
-    f_same = (dr.select(nearer_i, 1.0, -cos_phi), dr.select(nearer_i, 0.0, -sin_phi))
-    # e = ±(−f_y, f_x), the sign such that the farther edge bounds it from above
-    turn = dr.select((sin_phi > 0.0) == nearer_i, -1.0, 1.0)
-    e_same = (-turn * f_same[1], turn * f_same[0])
-    clearance: Any = dr.maximum(dr.abs(sin_phi), 1e-12)
+    (f_same, e_same), c_near, c_far, _, sin_d = _nearer_edge_axes(geometry, c_i, c_r)
+    clearance: Any = dr.maximum(sin_d, 1e-12)
     inverse = dr.rcp(clearance)
 
     # opposite sides: e ∝ a_i − a_r, f ∝ a_i + a_r towards the corner
