@@ -1,0 +1,250 @@
+"""``pbrdf render``: a painted scene as the picture of a polarisation camera."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from pbrdf.cli.console import progress_bar, warn
+from pbrdf.cli.values import require_folder_of
+from pbrdf.errors import PbrdfError
+
+if TYPE_CHECKING:
+    from pbrdf.models import Model
+    from pbrdf.rendering.picture import StokesPicture
+
+__all__ = ["render"]
+
+_MOST_ACROSS = 16_384
+
+
+def render(
+    models: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="MODEL",
+            help="Models' JSON files, folders of fits, or bundled paints: one object each (on the car: one piece).",
+            show_default=False,
+        ),
+    ] = None,
+    scene: Annotated[str, typer.Option(help="sphere, plate, car, or a Mitsuba scene FILE.xml.")] = "sphere",
+    light: Annotated[
+        str | None,
+        typer.Option(help="point, area, sky, constant, or envmap:FILE.", show_default="sky"),
+    ] = None,
+    sun_zenith: Annotated[
+        float | None,
+        typer.Option(help="Zenith angle of the sun or the lamp.", show_default="by scene", min=0.0, max=88.0),
+    ] = None,
+    sun_azimuth: Annotated[
+        float | None,
+        typer.Option(
+            help="Its azimuth: 0 on the right of the picture, 90 beyond the object, 270 behind the camera.",
+            show_default="by scene",
+            min=-360.0,
+            max=360.0,
+        ),
+    ] = None,
+    max_dolp: Annotated[
+        float | None,
+        typer.Option(help="DoLP of the sky at 90° from the sun.", show_default="0.8", min=0.0, max=1.0),
+    ] = None,
+    optical_depth: Annotated[
+        float | None,
+        typer.Option(help="Optical depth of the air that scatters.", show_default="0.2", min=0.0, max=10.0),
+    ] = None,
+    size: Annotated[
+        str | None,
+        typer.Option(
+            help="Width and height in pixels.", metavar="WIDTHxHEIGHT", show_default="512x512, or the file's"
+        ),
+    ] = None,
+    spp: Annotated[int, typer.Option(help="Samples per pixel.", min=1)] = 256,
+    depth: Annotated[int, typer.Option(help="Reflections of a path at most, plus one; -1 for no limit.")] = 8,
+    polarizer: Annotated[
+        list[float] | None,
+        typer.Option(
+            help="Also the view through a polariser at this angle, 0 horizontal, counterclockwise (repeatable).",
+            metavar="ANGLE",
+        ),
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Seed of the samples.", min=0)] = 0,
+    variant: Annotated[
+        str, typer.Option(help="Polarised variant of Mitsuba, e.g. cuda_ad_mono_polarized.")
+    ] = "llvm_ad_mono_polarized",
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output",
+            "-o",
+            help="A folder, or FILE.exr: then one figure beside it.",
+            show_default="<scene>-render",
+        ),
+    ] = None,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress bar.")] = False,
+) -> None:
+    """Render painted objects as a polarisation camera sees them: S0 … S3, DoLP and AoLP.
+
+    A sphere under a clear sky: `pbrdf render white`
+
+    Two paints, seen through a polariser: `pbrdf render white pearl-white --scene plate --polarizer 90`
+    """
+    from pbrdf.cli.sources import open_model
+    from pbrdf.report.files import require_writable
+
+    sources = models or []
+    own = not scene.endswith(".xml")
+    if own and not sources:
+        raise PbrdfError(
+            "name at least one model to paint with: a JSON file, the folder of a fit, or a bundled paint"
+        )
+    shape = _size(size)
+    named = {
+        "--light": light,
+        "--sun-zenith": sun_zenith,
+        "--sun-azimuth": sun_azimuth,
+        "--max-dolp": max_dolp,
+        "--optical-depth": optical_depth,
+    }
+    given = [name for name, value in named.items() if value is not None]
+    if not own and given:
+        raise PbrdfError(f"{scene} brings its own lights: leave {given[0]} out")
+    lamp = light or "sky"
+    if lamp != "sky" and (max_dolp is not None or optical_depth is not None):
+        raise PbrdfError(f"--{'max-dolp' if max_dolp is not None else 'optical-depth'} is for --light sky")
+    if not _has_direction(lamp) and (sun_zenith is not None or sun_azimuth is not None):
+        raise PbrdfError(f"--light {lamp} has no direction: leave --sun-zenith and --sun-azimuth out")
+    for angle in polarizer or ():
+        if not math.isfinite(angle):
+            raise PbrdfError("--polarizer: give an angle in degrees")
+    target = output or Path(f"{Path(scene).stem}-render")
+    if target.suffix.lower() == ".exr":
+        require_folder_of(target)
+    else:
+        require_writable(target)
+    paints = [open_model(source) for source in sources]
+    for source, model in zip(sources, paints, strict=True):
+        _warn_of_gain(source, model)
+
+    from pbrdf.rendering import bsdf_dict
+    from pbrdf.rendering.render import render_stokes
+    from pbrdf.rendering.scenes import load_scene_file
+    from pbrdf.rendering.variant import start_mitsuba
+
+    mitsuba = start_mitsuba(variant)
+    # what it warns of (a film's format, say) is settled by this command
+    mitsuba.set_log_level(mitsuba.LogLevel.Error)
+    coats = [bsdf_dict(model) for model in paints]
+    if own:
+        stage = _stage(
+            scene, coats, lamp, shape or (512, 512), sun_zenith, sun_azimuth, max_dolp, optical_depth
+        )
+    else:
+        stage = load_scene_file(Path(scene), coats, shape)
+    with progress_bar(f"Rendering {scene}", quiet) as progress:
+        picture = render_stokes(stage, spp=spp, depth=depth, seed=seed, progress=progress)
+    title = ", ".join(Path(source).name for source in sources) or Path(scene).name
+    notes = {"models": title, "scene": scene, "light": lamp if own else "of the scene", "variant": variant}
+    picture = replace(picture, attrs={**picture.attrs, **notes})
+    written = _write(picture, target, title, [math.radians(a) for a in polarizer or ()])
+    _tell(picture)
+    for path in written:
+        print(path)
+
+
+def _has_direction(light: str) -> bool:
+    """Whether a light of this name comes from somewhere."""
+    return light != "constant" and not light.startswith("envmap:")
+
+
+def _size(text: str | None) -> tuple[int, int] | None:
+    if text is None:
+        return None
+    match = re.fullmatch(r"\s*(\d{1,6})\s*[xX×]\s*(\d{1,6})\s*", text)
+    if match is None:
+        raise PbrdfError(f"--size {text!r}: give WIDTHxHEIGHT, for example 512x512")
+    width, height = int(match[1]), int(match[2])
+    if not (1 <= width <= _MOST_ACROSS and 1 <= height <= _MOST_ACROSS):
+        raise PbrdfError(f"--size {text}: width and height go from 1 to {_MOST_ACROSS}")
+    return width, height
+
+
+def _warn_of_gain(source: str, model: Model) -> None:
+    """Say so if a paint gives off more light than it gets: its amplitude is on a camera's scale, not on a BRDF's."""
+    import numpy as np
+
+    from pbrdf.inversion.plausibility import directional_hemispherical_reflectance
+
+    if any(np.ndim(value) for value in model.values.values()):
+        return
+    reflectance = float(directional_hemispherical_reflectance(model, math.radians(30.0)))
+    if reflectance > 1.0:
+        warn(
+            f"{source} reflects {reflectance:.2f} of the light it gets: its amplitude a is on the scale of the camera "
+            "that measured it; compare no brightness with other things in the scene"
+        )
+
+
+def _stage(
+    scene: str,
+    coats: Sequence[Any],
+    light: str,
+    size: tuple[int, int],
+    zenith: float | None,
+    azimuth: float | None,
+    max_dolp: float | None,
+    optical_depth: float | None,
+) -> Any:
+    from pbrdf.rendering.scenes import make_scene, subject
+    from pbrdf.rendering.sky import Sky
+
+    what = subject(scene, coats, size[0] / size[1])
+    direction = (
+        what.light[0] if zenith is None else math.radians(zenith),
+        what.light[1] if azimuth is None else math.radians(azimuth),
+    )
+    air = {"max_dolp": max_dolp, "optical_depth": optical_depth}
+    sky = Sky(*direction, **{name: value for name, value in air.items() if value is not None})
+    return make_scene(what, light, size, direction=direction, sky=sky)
+
+
+def _write(picture: StokesPicture, target: Path, title: str, polarizers: list[float]) -> list[Path]:
+    """Write the picture's files; returns them."""
+    from pbrdf.rendering.picture import polarizer_name, write_exr
+    from pbrdf.report.render_figure import channel_figure, polarizer_figure, stokes_figure
+    from pbrdf.report.style import save_figure
+
+    if target.suffix.lower() == ".exr":
+        write_exr(picture, target, polarizers)
+        figure = target.with_suffix(".png")
+        save_figure(stokes_figure(picture, title), figure)
+        return [target, figure]
+    target.mkdir(parents=True, exist_ok=True)
+    written = [target / "stokes.exr"]
+    write_exr(picture, written[0], polarizers)
+    figures = {"stokes": stokes_figure(picture, title)}
+    figures |= {name: channel_figure(picture, name, title) for name in ("s0", "dolp", "aolp")}
+    figures |= {polarizer_name(angle): polarizer_figure(picture, angle, title) for angle in polarizers}
+    for name, drawn in figures.items():
+        written.append(target / f"{name}.png")
+        save_figure(drawn, written[-1])
+    return written
+
+
+def _tell(picture: StokesPicture) -> None:
+    """Warn of pixels without a number and say how noisy the picture is."""
+    import numpy as np
+
+    lost = int((~np.isfinite(picture.stokes[0])).sum())
+    if lost:
+        warn(f"{lost} pixels hold no number: a material of the scene has returned none")
+    lit = picture.stokes[0] > 0.0
+    if lit.any() and np.isfinite(picture.std).any():
+        noise = float(np.median(picture.std[0][lit] / picture.stokes[0][lit]))
+        print(f"Standard error of S0, median over the lit pixels: {100.0 * noise:.2g} %")

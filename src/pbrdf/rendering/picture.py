@@ -1,0 +1,148 @@
+"""Pictures of Stokes vectors, and their OpenEXR files.
+
+The axes of a pixel belong to its line of sight: x lies across it, horizontal in the camera's frame, to the right of
+the picture; y is up; x, y and the direction in which the light travels, into the camera, are right-handed. The angle of
+linear polarisation is 0° along x and grows counterclockwise as the picture is seen; V > 0 is left circular light
+(docs/conventions.md). These are the axes of the instruments too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pbrdf.data.storage import atomic_target
+from pbrdf.errors import DataError
+from pbrdf.optics.elements import diattenuator
+from pbrdf.optics.stokes import aolp, dolp
+
+__all__ = ["StokesPicture", "polarizer_name", "read_exr", "write_exr"]
+
+_CONVENTION = (
+    "S0..S3 = I, Q, U, V; Q > 0 horizontal, U > 0 at +45 deg, V > 0 left circular (counterclockwise for the camera); "
+    "AoLP in degrees, 0 horizontal, counterclockwise as the picture is seen"
+)
+
+
+@dataclass(frozen=True)
+class StokesPicture:
+    """A rendered picture.
+
+    Attributes
+    ----------
+    stokes
+        I, Q, U, V, shape (4, rows, columns), rows from the top; axes as in the module's docstring.
+    std
+        Standard errors of the means over the samples, the same shape; NaN where one pass alone tells nothing of them.
+    attrs
+        What was rendered, and how.
+    """
+
+    stokes: np.ndarray
+    std: np.ndarray
+    attrs: Mapping[str, str | float] = field(default_factory=dict)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns."""
+        return self.stokes.shape[1], self.stokes.shape[2]
+
+    @property
+    def dolp(self) -> np.ndarray:
+        """Degree of linear polarisation; NaN where there is no light."""
+        return dolp(np.moveaxis(self.stokes, 0, -1))
+
+    @property
+    def aolp(self) -> np.ndarray:
+        """Angle of linear polarisation, radians, within (−π/2, π/2]; NaN where there is no light."""
+        return np.where(self.stokes[0] > 0.0, aolp(np.moveaxis(self.stokes, 0, -1)), np.nan)
+
+    def through_polarizer(self, angle: float) -> np.ndarray:
+        """Intensity behind a perfect linear polariser before the camera, ½ (I + Q cos2α + U sin2α).
+
+        Parameters
+        ----------
+        angle
+            Of its axis, radians: 0 horizontal, counterclockwise as the picture is seen.
+
+        Returns
+        -------
+        ndarray
+            Shape (rows, columns).
+        """
+        return np.tensordot(diattenuator(angle)[0], self.stokes, axes=1)
+
+
+def write_exr(picture: StokesPicture, path: Path, polarizers: Sequence[float] = ()) -> None:
+    """Write a picture as one OpenEXR file with a layer for each quantity, single precision.
+
+    Layers: ``S0.Y`` … ``S3.Y``, their standard errors ``S0.std`` … ``S3.std`` where they are known, ``DoLP.Y``,
+    ``AoLP.Y`` (degrees), and ``polarizer_30.Y`` for a polariser at 30°.
+
+    Parameters
+    ----------
+    picture
+        What to write.
+    path
+        The file; it appears complete or not at all.
+    polarizers
+        Angles of polarisers, radians.
+
+    Raises
+    ------
+    DataError
+        If the file cannot be written.
+    """
+    import mitsuba as mi
+
+    layers = {f"S{i}.Y": picture.stokes[i] for i in range(4)}
+    if np.isfinite(picture.std).any():
+        layers |= {f"S{i}.std": picture.std[i] for i in range(4)}
+    layers |= {"DoLP.Y": picture.dolp, "AoLP.Y": np.rad2deg(picture.aolp)}
+    layers |= {f"{polarizer_name(a)}.Y": picture.through_polarizer(a) for a in polarizers}
+    values = np.ascontiguousarray(np.stack(list(layers.values()), axis=-1), dtype=np.float32)
+    bitmap = mi.Bitmap(values, pixel_format=mi.Bitmap.PixelFormat.MultiChannel, channel_names=list(layers))
+    header = bitmap.metadata()
+    for name, value in {**picture.attrs, "convention": _CONVENTION}.items():
+        header[name] = value
+    with atomic_target(path) as target:
+        try:
+            bitmap.write(str(target), mi.Bitmap.FileFormat.OpenEXR)
+        except RuntimeError as error:
+            raise DataError(f"{path}: cannot be written: {' '.join(str(error).split())}") from error
+
+
+def polarizer_name(angle: float) -> str:
+    """Name of the view through a polariser at this angle, radians."""
+    return f"polarizer_{np.round(np.rad2deg(angle), 3):g}"
+
+
+def read_exr(path: Path) -> StokesPicture:
+    """Read a picture that :func:`write_exr` wrote.
+
+    Raises
+    ------
+    DataError
+        If the file cannot be read or lacks the layers.
+    """
+    import mitsuba as mi
+
+    try:
+        bitmap = mi.Bitmap(str(path))
+    except RuntimeError as error:
+        raise DataError(f"{path}: cannot be read as a picture: {' '.join(str(error).split())}") from error
+    names = [channel.name for channel in bitmap.struct_()]
+    values = np.array(bitmap, dtype=float)
+    missing = [f"S{i}.Y" for i in range(4) if f"S{i}.Y" not in names]
+    if missing:
+        raise DataError(f"{path}: there is no layer {missing[0]}; the file has {', '.join(names)}")
+    stokes = np.stack([values[..., names.index(f"S{i}.Y")] for i in range(4)])
+    std = np.full_like(stokes, np.nan)
+    if "S0.std" in names:
+        std = np.stack([values[..., names.index(f"S{i}.std")] for i in range(4)])
+    header: Any = bitmap.metadata()
+    return StokesPicture(stokes, std, {name: header[name] for name in header})

@@ -1,0 +1,14 @@
+"""Mitsuba for the tests of scenes; they are skipped without it."""
+
+from __future__ import annotations
+
+import pytest
+
+
+@pytest.fixture
+def mitsuba():
+    """Mitsuba's module with the default variant active and the plugins registered."""
+    pytest.importorskip("mitsuba", reason="rendering needs mitsuba: pip install 'pbrdf[render]'")
+    from pbrdf.rendering.variant import start_mitsuba
+
+    return start_mitsuba()
