@@ -13,8 +13,8 @@ demo: $(STAMP)
 	$(BIN)/pbrdf reproduce --output demo
 
 test: $(TEST_STAMP)
-	$(BIN)/ruff check src tests benchmarks scripts
-	$(BIN)/ruff format --check src tests benchmarks scripts
+	$(BIN)/ruff check src tests benchmarks scripts docs/examples
+	$(BIN)/ruff format --check src tests benchmarks scripts docs/examples
 	$(BIN)/mypy
 	$(BIN)/python -m pytest -n auto $(PYTEST_ARGS)
 
