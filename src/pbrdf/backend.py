@@ -27,6 +27,7 @@ from pbrdf.errors import BackendError
 __all__ = [
     "BACKENDS",
     "Backend",
+    "check_llvm",
     "find_bundled_llvm",
     "get_backend",
     "llvm_version",
@@ -172,6 +173,20 @@ def _start(name: str) -> Backend:
         )
     if not dr.has_backend(dr.JitBackend.LLVM):
         raise BackendError(f"Dr.Jit finds no usable LLVM on this machine. {_INSTALL_HINT}")
+    check_llvm()
+    import drjit.llvm.ad as llvm_module
+
+    return Backend("llvm", llvm_module)
+
+
+def check_llvm() -> None:
+    """Check the version of the LLVM that Dr.Jit has loaded.
+
+    Raises
+    ------
+    BackendError
+        If it is one that aborts the process.
+    """
     version = llvm_version()
     if version is not None and version[0] < MINIMUM_LLVM:
         found = ".".join(map(str, version))
@@ -181,9 +196,6 @@ def _start(name: str) -> Backend:
             else ""
         )
         raise BackendError(f"the LLVM that Dr.Jit loaded is version {found}, too old. {late}{_INSTALL_HINT}")
-    import drjit.llvm.ad as llvm_module
-
-    return Backend("llvm", llvm_module)
 
 
 def llvm_version() -> tuple[int, ...] | None:

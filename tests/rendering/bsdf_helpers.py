@@ -145,6 +145,4 @@ def plugin(mi, model, **changes):
     """The plugin's BSDF for a model, with its accuracy unless another is asked for."""
     import pbrdf.rendering
 
-    return mi.load_dict(
-        {**pbrdf.rendering.bsdf_dict(model), "accuracy": model.chosen["accuracy"], **changes}
-    )
+    return mi.load_dict({**pbrdf.rendering.bsdf_dict(model), "accuracy": model.chosen["accuracy"], **changes})

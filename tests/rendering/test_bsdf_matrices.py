@@ -48,7 +48,9 @@ def test_every_variant(variant, name):
     assert largest_difference(mi, model, 60 if variant in SCALAR else 5000) < TOLERANCE
 
 
-@pytest.mark.parametrize(("name", "choice"), CHOICES, ids=lambda c: c if isinstance(c, str) else "-".join(c.values()))
+@pytest.mark.parametrize(
+    ("name", "choice"), CHOICES, ids=lambda c: c if isinstance(c, str) else "-".join(c.values())
+)
 def test_every_choice(name, choice):
     """All combinations of normalisation, transmittance and shadowing."""
     mi = use("llvm_ad_mono_polarized")
@@ -234,4 +236,6 @@ def test_reciprocal_model_is_reciprocal():
 
     values = {**PAINT, "sigma": 0.0398, "kappa": 0.3}
     assert asymmetry(pbrdf.ReciprocalDoubleGauss(**values)) < 2e-5
-    assert asymmetry(pbrdf.DoubleGauss(**values)) > 0.1  # its body light leaves through facets but does not enter
+    assert (
+        asymmetry(pbrdf.DoubleGauss(**values)) > 0.1
+    )  # its body light leaves through facets but does not enter

@@ -12,6 +12,8 @@ same function is traced into a fit, an evaluation or a renderer's kernel.
 ``shadowing``       shadowing and masking: eq. (4) and its alternatives
 ``diffuse``         modified Rahman-Pinty-Verstraete shape: eqs (9)-(10)
 ``quadrature``      averages over the lit and seen facets
+``transport``       their nodes for rendering
+``powers``          powers, fast in single precision
 ``transmission``    body light leaving (and entering) through the facets: eqs (12)-(13)
 ``stokes``          degree and angle of polarisation, of arrays of any kind
 ``mueller``         physical realisability of Mueller matrices

@@ -10,6 +10,7 @@ from typing import Any
 
 import drjit as dr
 
+from pbrdf.backend import check_llvm
 from pbrdf.errors import BackendError
 from pbrdf.rendering.properties import PLUGIN, read_properties
 from pbrdf.rendering.surface import Surface
@@ -25,7 +26,7 @@ def register() -> None:
     Raises
     ------
     BackendError
-        If Mitsuba is not installed.
+        If Mitsuba is not installed, or Dr.Jit has loaded an LLVM that aborts the process.
     """
     global _following
     try:
@@ -44,6 +45,8 @@ def register() -> None:
 def _register_in_active_variant() -> None:
     import mitsuba as mi
 
+    if mi.variant().startswith("llvm"):
+        check_llvm()
     plugin = _plugin_class()
     mi.register_bsdf(PLUGIN, lambda props: plugin(props))
 

@@ -158,7 +158,7 @@ def _extent(parameter: Parameter, value: Any, texture: Any) -> Any:
 
     if isinstance(value, int | float):
         return float(value)
-    if isinstance(value, mi.Color3d):
+    if isinstance(value, mi.ScalarColor3d):
         numbers = np.ravel(value)
         if mi.is_spectral and (numbers.min() < 0.0 or numbers.max() > 1.0):
             raise ModelError(
