@@ -79,6 +79,31 @@ def test_flat_field_of_a_mosaic_is_of_natural_light(in_folder):
     assert np.abs(uncorrected.stokes[1:3]).max() > 500.0
 
 
+def test_transmittance_of_the_flat_field_where_it_is_stated(in_folder):
+    """Polarisers that pass 0.55 and 0.45, flat field of natural light: divided by a stated 0.5 of all, each state reads
+    as if it passed 0.5; the polarimeter that a calibration made of such readings is not corrected a second time."""
+    passed = np.array([0.55, 0.5, 0.5, 0.45])
+    response = np.empty((2 * ROWS, 2 * COLUMNS))
+    for state, (y, x) in enumerate(((0, 0), (0, 1), (1, 0), (1, 1))):
+        response[y::2, x::2] = passed[state]
+    flat = np.rint(20000.0 * response + 100.0).astype(np.uint16)
+    uneven = replace(MOSAIC, analyzer=MOSAIC.analyzer * (passed / 0.5)[:, None])
+    shot = np.rint(8000.0 * response + 100.0).astype(np.uint16)
+    frames = MosaicFrames(ArrayFrames(shot[None, None]), MOSAIC)
+    instrument = in_folder(uneven, flat_field=flat)
+    stated = replace(instrument, frames={**instrument.frames, "flat_transmittance": [0.5] * 4})
+    corrections = Corrections.of(stated, frames)
+    pixels = corrections.pixels(stated, slice(0, ROWS))
+    signal = (frames.read(0, 0, ROWS) - pixels.level) / pixels.flat
+    np.testing.assert_allclose(signal, 4000.0, rtol=1e-3)
+    wrong = replace(stated, frames={**instrument.frames, "flat_transmittance": [0.5] * 3})
+    with pytest.raises(DataError, match="flat_transmittance holds 3 numbers for the 4 states"):
+        Corrections.of(wrong, frames)
+    for value in ([0.5, -1], "0.5", [True] * 4):
+        with pytest.raises(DataError, match=r"flat_transmittance is .*: give a list of numbers more than 0"):
+            Corrections.of(replace(stated, frames={"flat_transmittance": value}), frames)
+
+
 def test_without_pictures_it_is_the_plain_reduction():
     draw = np.random.default_rng(3)
     raw = draw.integers(200, 3000, (4, ROWS, COLUMNS)).astype(np.uint16)

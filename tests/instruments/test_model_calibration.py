@@ -190,6 +190,23 @@ def test_inputs_held_out_verify():
     assert found.polarimeter.accuracy == (found.accuracy.linear, found.accuracy.circular)
 
 
+def test_each_input_held_out_in_turn():
+    """The settings are those of all inputs; what each input is found to be comes from a fit without it, as if it alone
+    had been held out. A dark input verifies nothing."""
+    rng = np.random.default_rng(6)
+    read = TRUE_SIX.intensities(INPUTS) + 0.1 * rng.standard_normal((6, INPUTS.shape[1]))
+    found = calibrate_model(lcvr(SIX), read, INPUTS, held_out="each")
+    everything = calibrate_model(lcvr(SIX), read, INPUTS)
+    np.testing.assert_array_equal(found.values, everything.values)
+    assert everything.accuracy is None and found.held_out == tuple(range(INPUTS.shape[1] - 1))
+    alone = calibrate_model(lcvr(SIX), read, INPUTS, held_out=[4])
+    np.testing.assert_array_equal(found.found[:, 4], alone.found[:, 4])
+    assert abs(found.found[:, 4] - everything.found[:, 4]).max() > 1e-6
+    errors = found.found[1:3, :-1] / found.found[0, :-1] - INPUTS[1:3, :-1] / INPUTS[0, :-1]
+    assert found.accuracy.linear == pytest.approx(np.sqrt(np.mean(errors**2)))
+    assert found.polarimeter.accuracy[0] == found.accuracy.linear
+
+
 def test_as_many_settings_as_readings():
     """One polariser, two inputs: gain and angle fit whatever was read; without variances nothing says how well."""
     truth = rotating_polarizer([0.35])
@@ -201,6 +218,8 @@ def test_as_many_settings_as_readings():
 
 
 def test_errors():
+    with pytest.raises(DataError, match="'each'"):
+        calibrate_model(lcvr(SIX), TRUE_SIX.intensities(INPUTS), INPUTS, held_out="all")
     read = TRUE_SIX.intensities(INPUTS)
     for other in (
         measured(TRUE_SIX.analyzer),

@@ -14,6 +14,7 @@ import typer
 from typer.core import TyperGroup
 
 import pbrdf
+from pbrdf.cli.calibrate import calibrate
 from pbrdf.cli.console import fail
 from pbrdf.cli.doctor import doctor
 from pbrdf.cli.export import export
@@ -23,6 +24,7 @@ from pbrdf.cli.lists import models, paints
 from pbrdf.cli.measure import measure
 from pbrdf.cli.plan import plan
 from pbrdf.cli.plot import plot
+from pbrdf.cli.polarimeter import polarimeter
 from pbrdf.cli.reduce import reduce
 from pbrdf.cli.render import render
 from pbrdf.cli.reproduce import reproduce
@@ -83,6 +85,8 @@ def options(
 
 app.command()(fit)
 app.command()(simulate)
+app.command()(calibrate)
+app.command()(polarimeter)
 app.command()(reduce)
 app.command()(plot)
 app.command()(plan)

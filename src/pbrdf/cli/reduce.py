@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from pbrdf.instruments.instrument import Instrument
     from pbrdf.instruments.regions import Region
 
-__all__ = ["reduce"]
+__all__ = ["open_regions", "reduce"]
 
 _UNITS = {"": 1, "K": 10**3, "M": 10**6, "G": 10**9, "T": 10**12}
 #: Less memory than this holds no block of a large picture.
@@ -111,7 +111,7 @@ def reduce(
         names = [name.strip() for name in series.split(",") if name.strip()]
         found = ChosenSeries(found, names)
         table = None if table is None else table.rows(names)
-    chosen = _regions(regions, roi or [])
+    chosen = open_regions(regions, roi or [])
     if table is not None and not chosen:
         raise PbrdfError(
             f"--angles: say which part of the picture is the sample, for example "
@@ -165,7 +165,8 @@ def _instrument(source: str) -> Instrument:
     return load_instrument(source)
 
 
-def _regions(file: Path | None, texts: list[str]) -> dict[str, Region]:
+def open_regions(file: Path | None, texts: list[str]) -> dict[str, Region]:
+    """Regions of --regions and --roi by name; raises PbrdfError if one is not understood or a name comes twice."""
     from pbrdf.instruments.region_files import read_regions, region_from_text
 
     found = {} if file is None else read_regions(file)

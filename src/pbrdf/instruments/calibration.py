@@ -16,44 +16,26 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pbrdf.errors import DataError
-from pbrdf.instruments.detector import Detector
 from pbrdf.instruments.polarimeter import STOKES, Polarimeter, measured
-from pbrdf.instruments.reduction import count_flags, flag_pixels
+from pbrdf.instruments.readings import Readings, read_inputs
 from pbrdf.instruments.stokes_solution import solve_stokes
 from pbrdf.optics import stokes as degrees
 
-__all__ = ["Accuracy", "Calibration", "Readings", "calibrate", "read_inputs", "standard_inputs", "verify"]
+__all__ = [
+    "Accuracy",
+    "Calibration",
+    "Readings",
+    "accuracy_of",
+    "calibrate",
+    "input_errors",
+    "read_inputs",
+    "reduced_inputs",
+    "standard_inputs",
+    "verify",
+]
 
 #: Input states whose Stokes vectors have a singular value below this share of the largest do not span the others.
 _SPAN = 1e-6
-
-
-@dataclass(frozen=True, eq=False)
-class Readings:
-    """What the instrument read at K known inputs.
-
-    Attributes
-    ----------
-    intensities
-        Signal above black level, shape (N, K), or (N, K, rows, columns) of the cells of a map; NaN in a cell without a
-        good pixel.
-    variance
-        Of the intensities, the same shape.
-    pixels
-        How many good pixels are behind each number, shape () or (rows, columns).
-    flags
-        :class:`~pbrdf.instruments.reduction.PixelFlag` of the pixels, of all inputs together, uint8. A pixel that is
-        bad at one input is left out at all of them: every input is averaged over the same pixels.
-    """
-
-    intensities: np.ndarray
-    variance: np.ndarray
-    pixels: np.ndarray
-    flags: np.ndarray
-
-    def counts(self) -> dict[str, int]:
-        """How many pixels are good, and how many carry each flag."""
-        return count_flags(self.flags)
 
 
 @dataclass(frozen=True)
@@ -98,6 +80,10 @@ class Calibration:
         Rms of intensities minus W·S over the mean intensity.
     filled
         Cells without a good pixel, which carry the vectors of the nearest good one, bool, shape (rows, columns) or ().
+    found
+        Stokes vectors that the readings give, shape (4, K) or (4, K, rows, columns): of an input held out by vectors in
+        which it has no part, of the others by those of the polarimeter. NaN where there are no readings, and in what is
+        not measured.
     """
 
     polarimeter: Polarimeter
@@ -106,6 +92,7 @@ class Calibration:
     held_out: tuple[int, ...]
     residual: float
     filled: np.ndarray
+    found: np.ndarray
 
 
 def standard_inputs(angles: int = 12, *, circular: bool = True, natural: bool = False) -> np.ndarray:
@@ -127,78 +114,6 @@ def standard_inputs(angles: int = 12, *, circular: bool = True, natural: bool = 
     if natural:
         columns.append(np.array([[1.0], [0.0], [0.0], [0.0]]))
     return np.concatenate(columns, axis=1)
-
-
-def read_inputs(
-    frames: ArrayLike,
-    detector: Detector,
-    *,
-    cells: tuple[int, int] | None = (1, 1),
-    dead: ArrayLike | None = None,
-    dark_level: float = 0.0,
-    black: ArrayLike | None = None,
-    flat: ArrayLike | None = None,
-) -> Readings:
-    """Mean intensities of calibration frames over cells of the field of view, bad pixels left out.
-
-    Parameters
-    ----------
-    frames
-        Raw digital numbers, shape (N, K, rows, columns): N states at K inputs.
-    detector
-        What took them.
-    cells
-        Rows and columns of cells that the field is divided into, as :meth:`Polarimeter.spread` divides it; (1, 1) is
-        one for all, None one for each pixel.
-    dead, dark_level, black, flat
-        See :func:`pbrdf.instruments.reduction.reduce_frames`; shapes (rows, columns).
-
-    Raises
-    ------
-    DataError
-        If shapes do not fit, or no pixel is good.
-    """
-    frames = np.asarray(frames)
-    if frames.ndim != 4 or 0 in frames.shape:
-        raise DataError(
-            f"calibration frames have the shape {frames.shape}: give (states, inputs, rows, columns)"
-        )
-    states, inputs, rows, columns = frames.shape
-    tall, wide = (rows, columns) if cells is None else cells
-    if not (1 <= tall <= rows and 1 <= wide <= columns):
-        raise DataError(f"pictures of {rows} × {columns} pixels cannot be divided into {tall} × {wide} cells")
-    level = np.asarray(detector.black if black is None else black, dtype=float)
-    response = np.asarray(1.0 if flat is None else flat, dtype=float)
-    for name, array in (("the black level", level), ("the flat field", response)):
-        if array.shape not in ((), (rows, columns)):
-            raise DataError(f"{name} has the shape {array.shape}, the frames are {rows} × {columns} pixels")
-    flags = np.zeros((rows, columns), dtype=np.uint8)
-    for k in range(inputs):
-        flags |= flag_pixels(frames[:, k], detector, dead=dead, dark_level=dark_level, black=black)
-    good = flags == 0
-    if not good.any():
-        raise DataError("no pixel of the calibration frames is good: all are saturated, dead or dark")
-    if not (np.broadcast_to(response, good.shape)[good] > 0.0).all():
-        raise DataError("the flat field is not positive at a pixel that is used: mark it as dead")
-    response = np.where(good, response, 1.0)
-    starts = [-(-np.arange(count) * size // count) for count, size in ((tall, rows), (wide, columns))]
-
-    def total(image: np.ndarray) -> np.ndarray:
-        return np.add.reduceat(np.add.reduceat(image, starts[0], axis=0), starts[1], axis=1)
-
-    pixels = total(good.astype(int))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        share = np.where(pixels > 0, 1.0 / pixels, np.nan)
-    intensities = np.empty((states, inputs, tall, wide))
-    variance = np.empty_like(intensities)
-    for j in range(states):
-        for k in range(inputs):
-            frame = np.where(good, frames[j, k], level)
-            intensities[j, k] = total((frame - level) / response * good) * share
-            variance[j, k] = total(detector.variance(frame) / response**2 * good) * share**2
-    if cells == (1, 1):
-        intensities, variance, pixels = intensities[..., 0, 0], variance[..., 0, 0], pixels[0, 0]
-    return Readings(intensities, variance, np.asarray(pixels), flags)
 
 
 def calibrate(
@@ -263,11 +178,11 @@ def calibrate(
             raise DataError(f"without the inputs held out, the others do not determine {', '.join(missing)}")
     W, covariance, residual = _solve(read, S, spread, train, used)
     if isinstance(held_out, str):
-        solved = ((k, _solve(read, S, spread, [j for j in train if j != k], used)[0]) for k in out)
+        own = {k: _solve(read, S, spread, [j for j in train if j != k], used)[0] for k in out}
     else:
-        solved = ((k, W) for k in out)
-    errors = [_errors(own, read[:, k], S[:, k]) for k, own in solved if S[0, k] > 0.0]
-    accuracy = _accuracy(errors) if errors else None
+        own = {}
+    found = np.stack([reduced_inputs(own.get(k, W), read[:, k]) for k in range(count)], axis=1)
+    accuracy = accuracy_of(found, S, out)
     W, covariance, filled = _fill(W, covariance)
     polarimeter = measured(W, states, name)
     if mosaic is not None:
@@ -276,7 +191,7 @@ def calibrate(
         )
     if accuracy is not None:
         polarimeter = polarimeter.with_accuracy(accuracy.linear, np.nan_to_num(accuracy.circular))
-    return Calibration(polarimeter, covariance, accuracy, tuple(out), residual, filled)
+    return Calibration(polarimeter, covariance, accuracy, tuple(out), residual, filled, found)
 
 
 def verify(polarimeter: Polarimeter, intensities: ArrayLike, stokes: ArrayLike) -> Accuracy:
@@ -301,7 +216,65 @@ def verify(polarimeter: Polarimeter, intensities: ArrayLike, stokes: ArrayLike) 
         raise DataError(
             f"give intensities of the {polarimeter.size} states of {polarimeter.name}, at inputs of positive intensity"
         )
-    return _accuracy([_errors(polarimeter.analyzer, read[:, k], S[:, k]) for k in range(S.shape[1])])
+    found = np.stack([reduced_inputs(polarimeter.analyzer, read[:, k]) for k in range(S.shape[1])], axis=1)
+    accuracy = accuracy_of(found, S)
+    assert accuracy is not None
+    return accuracy
+
+
+def reduced_inputs(analyzer: np.ndarray, intensities: np.ndarray) -> np.ndarray:
+    """Stokes vectors (4, ...) from intensities (N, ...), states weighing alike; NaN in what is not measured.
+
+    Parameters
+    ----------
+    analyzer
+        Shape (N, 4), or (rows, columns, N, 4) for intensities of the shape (N, rows, columns).
+    """
+    known = np.isfinite(analyzer).all(axis=(-1, -2))
+    analyzer = np.where(known[..., None, None], analyzer, 0.0)
+    return solve_stokes(intensities, np.ones_like(intensities), analyzer, weighted=False)[0]
+
+
+def input_errors(found: np.ndarray, stokes: np.ndarray) -> np.ndarray:
+    """Errors of Q/I, U/I, V/I, DoLP and DoCP.
+
+    Parameters
+    ----------
+    found
+        Stokes vectors, shape (4, K, ...).
+    stokes
+        The inputs, shape (4, K).
+
+    Returns
+    -------
+    ndarray
+        Shape (5, K, ...).
+    """
+    true = np.reshape(stokes, (*np.shape(stokes), *(1,) * (found.ndim - 2)))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        parts = list(found[1:] / found[0] - true[1:] / true[0])
+    last, first = np.moveaxis(found, 0, -1), np.moveaxis(true, 0, -1)
+    parts += [degrees.dolp(last) - degrees.dolp(first), degrees.docp(last) - degrees.docp(first)]
+    return np.stack(parts)
+
+
+def accuracy_of(
+    found: np.ndarray, stokes: np.ndarray, inputs: Sequence[int] | None = None
+) -> Accuracy | None:
+    """Rms errors of Stokes vectors found (4, K, ...) at some of the inputs (4, K), all by default, that are lit.
+
+    None if there is no such input.
+    """
+    chosen = [k for k in (range(stokes.shape[1]) if inputs is None else inputs) if stokes[0, k] > 0.0]
+    if not chosen:
+        return None
+    squares = input_errors(found[:, chosen], stokes[:, chosen]) ** 2
+
+    def rms(*rows: int) -> float:
+        part = squares[list(rows)]
+        return float(np.sqrt(part[np.isfinite(part)].mean())) if np.isfinite(part).any() else float("nan")
+
+    return Accuracy(rms(0, 1), rms(2), rms(3), rms(4), len(chosen))
 
 
 def _checked(
@@ -351,29 +324,6 @@ def _solve(
         covariance = covariance * ((residuals**2).sum(axis=0) / freedom)
     residual = float(np.sqrt(np.nanmean(residuals**2)) / np.nanmean(values))
     return np.moveaxis(W, (0, 1), (-1, -2)), np.moveaxis(covariance, (0, 1, 2), (-2, -1, -3)), residual
-
-
-def _errors(W: np.ndarray, intensities: np.ndarray, stokes: np.ndarray) -> np.ndarray:
-    """Errors of Q/I, U/I, V/I, DoLP and DoCP at one input (N, ...), shape (5, ...)."""
-    known = np.isfinite(W).all(axis=(-1, -2))
-    W = np.where(known[..., None, None], W, 0.0)
-    found, _ = solve_stokes(intensities, np.ones_like(intensities), W, weighted=False)
-    ratios = found[1:] / found[0]
-    true = stokes[1:] / stokes[0]
-    last = np.moveaxis(found, 0, -1)
-    parts = [ratios[i] - true[i] for i in range(3)]
-    parts += [degrees.dolp(last) - degrees.dolp(stokes), degrees.docp(last) - degrees.docp(stokes)]
-    return np.stack(parts)
-
-
-def _accuracy(errors: list[np.ndarray]) -> Accuracy:
-    squares = np.stack(errors).reshape(len(errors), 5, -1) ** 2
-
-    def rms(rows: list[int]) -> float:
-        part = squares[:, rows]
-        return float(np.sqrt(part[np.isfinite(part)].mean())) if np.isfinite(part).any() else float("nan")
-
-    return Accuracy(rms([0, 1]), rms([2]), rms([3]), rms([4]), len(errors))
 
 
 def _fill(W: np.ndarray, covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -21,7 +21,7 @@ from pbrdf.instruments.instrument import Instrument
 from pbrdf.instruments.reduction import StokesImage, reduce_frames, split_mosaic
 from pbrdf.instruments.stokes_solution import solve_stokes
 
-__all__ = ["Corrections", "reduce_rows"]
+__all__ = ["Corrections", "PixelLevels", "reduce_rows", "require_range"]
 
 #: Rows of the flat field that are worked on at a time.
 _ROWS = 128
@@ -64,6 +64,12 @@ class Corrections:
             for key in ("dark_frame", "flat_field", "dead_pixels")
         }
         dead = None if read["dead_pixels"] is None else (read["dead_pixels"] != 0).any(axis=0)
+        stated = layout.flat_transmittance
+        if stated is not None and len(stated) != instrument.polarimeter.size:
+            raise DataError(
+                f"[frames] flat_transmittance holds {len(stated)} numbers for the {instrument.polarimeter.size} states "
+                f"of {instrument.polarimeter.name}"
+            )
         made = cls(read["dark_frame"], read["flat_field"], dead, layout)
         return made if made.flat is None else replace(made, flat_scale=made._mean_flat(instrument))
 
@@ -96,11 +102,72 @@ class Corrections:
         assert self.flat is not None
         if polarimeter.mosaic is None:
             return 1.0
+        if self.layout.flat_transmittance is not None:
+            return np.array(self.layout.flat_transmittance)[:, None, None]
         if polarimeter.is_map:
             height, width = self.flat.shape[1:]
             analyzer = polarimeter.spread(height, width, rows.start, rows.stop)
             return np.moveaxis(analyzer[..., 0], -1, 0)
         return polarimeter.analyzer[:, 0, None, None]
+
+    def pixels(self, instrument: Instrument, rows: slice) -> PixelLevels:
+        """Level, response and dead pixels of some rows."""
+        level = self._level(instrument, rows)
+        dead = None if self.dead is None else self.dead[rows]
+        if self.flat is None:
+            return PixelLevels(level, np.inf, 1.0, dead)
+        flat = self.flat[:, rows]
+        light = flat - level
+        blind = (light <= 0.0) | instrument.detector.saturated(flat)
+        light[blind] = 1.0
+        dead = np.logical_or(blind.any(axis=0), False if dead is None else dead)
+        return PixelLevels(
+            level, light, light / (self.flat_scale * self._transmittance(instrument, rows)), dead
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class PixelLevels:
+    """What stands between the light on some pixels and their numbers.
+
+    Attributes
+    ----------
+    level
+        Digital numbers without light, shape (N or 1, rows, columns), or one number for all.
+    light
+        Flat field above this level, likewise; infinite without one.
+    response
+        Of the pixels relative to the mean, likewise: the signal is divided by it.
+    dead
+        Bool, shape (rows, columns), or None.
+    """
+
+    level: np.ndarray | float
+    light: np.ndarray | float
+    response: np.ndarray | float
+    dead: np.ndarray | None
+
+    @property
+    def black(self) -> np.ndarray | None:
+        """The level as :func:`~pbrdf.instruments.reduction.reduce_frames` takes it; None for the detector's own."""
+        return _of_pixels(self.level) if isinstance(self.level, np.ndarray) else None
+
+    @property
+    def flat(self) -> np.ndarray | None:
+        """The response as :func:`~pbrdf.instruments.reduction.reduce_frames` takes it."""
+        return _of_pixels(self.response) if isinstance(self.response, np.ndarray) else None
+
+
+def require_range(raw: np.ndarray, instrument: Instrument) -> None:
+    """Check that raw digital numbers are within the range of the detector's converter; raises DataError."""
+    detector = instrument.detector
+    top = 2**detector.bits - 1
+    if raw.dtype.itemsize == 1 and detector.bits > 8:
+        raise DataError(f"its numbers have 8 bits, but [detector] says bits = {detector.bits}")
+    if raw.size and int(raw.max()) > top:
+        raise DataError(
+            f"a pixel reads {int(raw.max())}, but {detector.bits} bits end at {top}: set bits in [detector]"
+        )
 
 
 def _read(key: str, path: Path | None, instrument: Instrument, frames: Frames) -> np.ndarray | None:
@@ -148,33 +215,19 @@ def reduce_rows(
     """
     first, last, total = rows
     detector, polarimeter = instrument.detector, instrument.polarimeter
-    top = 2**detector.bits - 1
-    if raw.dtype.itemsize == 1 and detector.bits > 8:
-        raise DataError(f"its numbers have 8 bits, but [detector] says bits = {detector.bits}")
-    if raw.size and int(raw.max()) > top:
-        raise DataError(
-            f"a pixel reads {int(raw.max())}, but {detector.bits} bits end at {top}: set bits in [detector]"
-        )
+    require_range(raw, instrument)
     here = slice(first, last)
     analyzer = (
         polarimeter.spread(total, raw.shape[2], first, last) if polarimeter.is_map else polarimeter.analyzer
     )
-    dead = None if corrections.dead is None else corrections.dead[here]
-    level = corrections._level(instrument, here)
+    pixels = corrections.pixels(instrument, here)
+    level, light, response = pixels.level, pixels.light, pixels.response
     level_variance: np.ndarray | float = 0.0
     if corrections.dark is not None:
         level_variance = detector.variance(level) / corrections.layout.dark_exposures
-    response: np.ndarray | float = 1.0
-    light: np.ndarray | float = np.inf
     flat_variance: np.ndarray | float = 0.0
     if corrections.flat is not None:
-        flat = corrections.flat[:, here]
-        light = flat - level
-        blind = (light <= 0.0) | detector.saturated(flat)
-        light[blind] = 1.0
-        dead = np.logical_or(blind.any(axis=0), False if dead is None else dead)
-        response = light / (corrections.flat_scale * corrections._transmittance(instrument, here))
-        flat_variance = detector.variance(flat) / corrections.layout.flat_exposures
+        flat_variance = detector.variance(corrections.flat[:, here]) / corrections.layout.flat_exposures
     # The dark frame is taken from the flat field too: what it adds there counts against what it takes here.
     own: np.ndarray | None = None
     independent = polarimeter.mosaic is not None
@@ -185,12 +238,12 @@ def reduce_rows(
         raw,
         polarimeter,
         detector,
-        dead=dead,
+        dead=pixels.dead,
         dark_level=dark_level,
         weighted=weighted,
         analyzer=analyzer,
-        black=None if corrections.dark is None else _of_pixels(level),
-        flat=None if corrections.flat is None else _of_pixels(response),
+        black=pixels.black,
+        flat=pixels.flat,
         extra_variance=own,
     )
     if not independent and corrections.dark is not None:
@@ -201,10 +254,9 @@ def reduce_rows(
     return image
 
 
-def _of_pixels(values: np.ndarray | float) -> np.ndarray:
+def _of_pixels(values: np.ndarray) -> np.ndarray:
     """(1, rows, columns) as (rows, columns)."""
-    array = np.asarray(values)
-    return array[0] if len(array) == 1 else array
+    return values[0] if len(values) == 1 else values
 
 
 def _all_states_alike(shape: tuple[int, ...], signal: np.ndarray, analyzer: np.ndarray) -> np.ndarray:

@@ -204,6 +204,9 @@ class FrameLayout:
         Picture that is not 0 where a pixel must not be used.
     dark_exposures, flat_exposures
         How many exposures the dark frame and the flat field are the mean of: their noise is that much less.
+    flat_transmittance
+        Of a mosaic's states for the light of the flat field, in any unit; None for what the polarimeter says of natural
+        light. A calibration made with the flat field holds for that of the nominal polarimeter, and writes it here.
     """
 
     pattern: str | None = None
@@ -212,6 +215,7 @@ class FrameLayout:
     dead_pixels: Path | None = None
     dark_exposures: int = 1
     flat_exposures: int = 1
+    flat_transmittance: tuple[float, ...] | None = None
 
     @classmethod
     def from_table(cls, table: dict[str, Any], folder: Path | None = None) -> FrameLayout:
@@ -231,6 +235,11 @@ class FrameLayout:
                 if not (isinstance(value, int) and not isinstance(value, bool) and value >= 1):
                     raise DataError(f"[frames] {key} is {value!r}: give a whole number from 1")
                 values[key] = value
+            elif key == "flat_transmittance":
+                numbers = isinstance(value, list) and all(type(v) in (int, float) and v > 0.0 for v in value)
+                if not numbers:
+                    raise DataError(f"[frames] {key} is {value!r}: give a list of numbers more than 0")
+                values[key] = tuple(map(float, value))
             elif not isinstance(value, str) or not value:
                 raise DataError(f"[frames] {key} is {value!r}: give a text in quotes")
             else:

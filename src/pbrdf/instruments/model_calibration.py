@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pbrdf.errors import DataError, FitError
-from pbrdf.instruments.calibration import Accuracy, verify
+from pbrdf.instruments.calibration import Accuracy, accuracy_of, reduced_inputs
 from pbrdf.instruments.calibration_settings import Settings
 from pbrdf.instruments.polarimeter import Polarimeter
 
@@ -47,6 +47,8 @@ class ModelCalibration:
     values, errors
         Of the settings and their standard errors; angles and retardances in degrees. The error is 0 for a fixed one,
         and NaN if there are no more readings than settings and no variances.
+    start
+        Nominal values, in the same units; of a gain what the readings are at first sight.
     fixed
         Why a setting was kept at its nominal value, by name.
     covariance
@@ -61,11 +63,16 @@ class ModelCalibration:
         Readings minus settings fitted.
     accuracy
         Rms errors at the inputs held out; None if none was.
+    held_out
+        Their indices.
+    found
+        Stokes vectors that the readings give, shape (4, K); of an input held out by settings in which it has no part.
     """
 
     names: tuple[str, ...]
     values: np.ndarray
     errors: np.ndarray
+    start: np.ndarray
     fixed: dict[str, str]
     covariance: np.ndarray
     polarimeter: Polarimeter
@@ -73,6 +80,8 @@ class ModelCalibration:
     chi2: float | None
     freedom: int
     accuracy: Accuracy | None
+    held_out: tuple[int, ...]
+    found: np.ndarray
 
     def value(self, name: str) -> float:
         """Value of a setting."""
@@ -92,7 +101,7 @@ def calibrate_model(
     gain: Literal["common", "each", "fixed"] = "common",
     fixed: Sequence[str] = ("analyzer",),
     shared: bool = True,
-    held_out: Sequence[int] = (),
+    held_out: Sequence[int] | Literal["each"] = (),
 ) -> ModelCalibration:
     """Fit the settings of a polarimeter to readings at known inputs.
 
@@ -115,7 +124,8 @@ def calibrate_model(
     shared
         Whether states with the same nominal retardance share it (they are driven by the same voltage).
     held_out
-        Indices of inputs that only verify.
+        Indices of inputs that only verify; or ``"each"``: the settings come from all inputs, and each in turn that is
+        not dark is reduced with those of a fit without it.
 
     Returns
     -------
@@ -144,6 +154,18 @@ def calibrate_model(
         raise DataError(
             "intensities and inputs must be finite, and their variances positive and of the same shape"
         )
+    if isinstance(held_out, str):
+        if held_out != "each":
+            raise DataError(f"held_out is {held_out!r}: give indices of inputs, or 'each'")
+
+        def without(*out: int) -> ModelCalibration:
+            return calibrate_model(
+                nominal, read, S, variance=variance, gain=gain, fixed=fixed, shared=shared, held_out=out
+            )
+
+        out = [k for k in range(S.shape[1]) if S[0, k] > 0.0]
+        found = np.stack([without(k).found[:, k] for k in out], axis=1)
+        return _verified(without(), out, found, S)
     kept = [k for k in range(S.shape[1]) if k not in set(held_out)]
     if len(set(held_out)) != S.shape[1] - len(kept):
         raise DataError(f"an input held out is not one of 0 … {S.shape[1] - 1}")
@@ -198,22 +220,34 @@ def calibrate_model(
     scale = units[free]
     details = {**settings.described(x), "calibrated": True}
     polarimeter = replace(nominal, analyzer=W, name=f"{nominal.name}, calibrated", details=details)
-    out = sorted(set(held_out))
-    accuracy = verify(polarimeter, read[:, out] - b, S[:, out]) if out else None
-    if accuracy is not None:
-        polarimeter = polarimeter.with_accuracy(accuracy.linear, np.nan_to_num(accuracy.circular))
-    return ModelCalibration(
+    made = ModelCalibration(
         names=tuple(settings.names),
         values=x * units,
         errors=errors * units,
+        start=settings.start * units,
         fixed=reasons,
         covariance=covariance * np.outer(scale, scale),
         polarimeter=polarimeter,
         residual=float(np.sqrt(np.mean((left * sigma.ravel()) ** 2)) / np.mean(read[:, kept])),
         chi2=float(left @ left) if variance is not None else None,
         freedom=freedom,
-        accuracy=accuracy,
+        accuracy=None,
+        held_out=(),
+        found=reduced_inputs(W, read - b),
     )
+    out = sorted(set(held_out))
+    return _verified(made, out, made.found[:, out], S)
+
+
+def _verified(made: ModelCalibration, out: list[int], found: np.ndarray, S: np.ndarray) -> ModelCalibration:
+    """The calibration with what it finds at inputs held out, and the accuracy that follows."""
+    everywhere = made.found.copy()
+    everywhere[:, out] = found
+    accuracy = accuracy_of(everywhere, S, out)
+    polarimeter = made.polarimeter
+    if accuracy is not None:
+        polarimeter = polarimeter.with_accuracy(accuracy.linear, np.nan_to_num(accuracy.circular))
+    return replace(made, polarimeter=polarimeter, accuracy=accuracy, held_out=tuple(out), found=everywhere)
 
 
 def _put(x: np.ndarray, where: np.ndarray, values: np.ndarray) -> np.ndarray:
