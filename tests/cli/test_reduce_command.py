@@ -236,7 +236,7 @@ def test_zarr_is_replaced_as_a_whole(run, tmp_path, setup):
         (("-p", "none.toml"), "none.toml: cannot be read"),
         (
             ("-p", "papers"),
-            "--polarimeter 'papers': give a TOML file, or one of the built-in instruments paper",
+            "papers: there is no such file, and no built-in instrument of that name: paper",
         ),
         (("-p", "paper"), "a pixel reads"),
         (("--roi", "paint"), "--roi 'paint': give NAME=VALUE, for example --roi paint=100:200,150:260"),

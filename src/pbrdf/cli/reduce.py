@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from pbrdf.cli.console import output_console, progress_bar
+from pbrdf.cli.instruments import open_instrument
 from pbrdf.cli.values import number, pairs
 from pbrdf.errors import PbrdfError
 
 if TYPE_CHECKING:
-    from pbrdf.instruments.instrument import Instrument
     from pbrdf.instruments.regions import Region
 
 __all__ = ["open_regions", "reduce"]
@@ -104,7 +104,7 @@ def reduce(
         from pbrdf.data.zarr_folder import require_zarr
 
         require_zarr(Path("stokes.zarr"))
-    instrument = _instrument(polarimeter)
+    instrument = open_instrument(polarimeter)
     found: Frames = open_frames(frames, instrument)
     table = None if angles is None else read_angles(angles)
     if series is not None:
@@ -149,20 +149,6 @@ def reduce(
     shown = {name: means for name, means in result.averages.items() if name in chosen} or result.averages
     print_averages(shown, found.names, console)
     console.print(f"\nWritten to {folder}/: {', '.join(path.name for path in result.files)}", markup=False)
-
-
-def _instrument(source: str) -> Instrument:
-    """An instrument from its file, or a built-in one where no file has that name."""
-    from pbrdf.instruments.instrument_files import load_instrument
-    from pbrdf.instruments.presets import PRESETS, preset
-
-    if source in PRESETS and not Path(source).exists():
-        return preset(source)
-    if not Path(source).suffix:
-        raise PbrdfError(
-            f"--polarimeter {source!r}: give a TOML file, or one of the built-in instruments {', '.join(PRESETS)}"
-        )
-    return load_instrument(source)
 
 
 def open_regions(file: Path | None, texts: list[str]) -> dict[str, Region]:

@@ -102,8 +102,8 @@ class DoubleGauss(Model):
     shadowing
         ``"v-cavity"`` (paper eq. 4), ``"smith"`` (height-correlated) or ``"none"``.
     accuracy
-        Accuracy of the average over the facets: ``"default"``, ``"high"`` (slow, for reference values) or
-        ``"draft"`` (for searching).
+        Accuracy of the average over the facets: ``"default"``, ``"high"`` (slow, for reference values),
+        ``"draft"`` (for searching) or ``"fast"`` (for rendering), see docs/model.md, section 4.
 
     Every parameter may be an array (a map of paints) that broadcasts against the angles.
 
