@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 from dataclasses import replace
 
 import numpy as np
@@ -54,7 +55,7 @@ def test_a_plan_can_be_measured_and_fitted(run, tmp_path):
 def test_a_measurement_is_a_folder_of_frames(run, tmp_path):
     result = run(
         *("measure", "white", "pearl-white", "--positions", "60,100", "--sample-angles", "20:70:25"),
-        *("--bits", 10, "--source-radius", 0.5, "--pixels", 6, "-o", "virtual"),
+        *("--bits", 10, "--source-radius", 0.5, "--patch", 6, "-o", "virtual"),
     )
     assert "virtual: 6 geometries, 4 states, 2 sample(s), simulated" in result.stdout
     folder = tmp_path / "virtual"
@@ -71,12 +72,10 @@ def test_a_measurement_is_a_folder_of_frames(run, tmp_path):
 
 
 def test_reduce_gives_the_same_data_as_measure(run, tmp_path):
-    run("measure", "white", "--positions", "70", "--sample-angles", "30,55", "--pixels", 5, "-o", "virtual")
-    here = tmp_path / "virtual"
-    run(
-        *("reduce", here / "frames", "--polarimeter", here / "polarimeter.toml"),
-        *("--angles", here / "angles.csv", "--regions", here / "regions.toml", "-o", "reduced"),
-    )
+    here = tmp_path / "virtual run"
+    told = run("measure", "white", "--positions", 70, "--sample-angles", "30,55", "--patch", 5, "-o", here)
+    (command,) = (line for line in told.stdout.splitlines() if line.startswith("Reduce with: pbrdf "))
+    run(*shlex.split(command.removeprefix("Reduce with: pbrdf ")), "-o", "reduced")
     (found,) = (tmp_path / "reduced").rglob("white.csv")
     again, once = pbrdf.read(found), pbrdf.read(here / "white.nc")
     for name in "IQUV":
@@ -84,7 +83,7 @@ def test_reduce_gives_the_same_data_as_measure(run, tmp_path):
 
 
 def test_geometries_below_the_horizon_are_told(run):
-    result = run("measure", "white", "--positions", 140, "--sample-angles", "20,75,80", "--pixels", 2)
+    result = run("measure", "white", "--positions", 140, "--sample-angles", "20,75,80", "--patch", 2)
     assert (
         "Left out, as source or camera would be hidden or below the horizon: 2 of 3 at position 1 (140°)"
         in result.stderr
@@ -97,6 +96,9 @@ def test_geometries_below_the_horizon_are_told(run):
         (("plan", "nothing"), "nothing: there is no such file"),
         (("plan", "white", "-o", "plan.txt"), "the extension must be .csv"),
         (("plan", "white", "-o", "no/plan.csv"), "there is no folder no"),
+        (("plan", "white", "-o", "taken.csv"), "taken.csv: this is a folder"),
+        (("plan", "white", "-o", "drawn.csv"), "drawn.png: this is a folder"),
+        (("plan", "white", "--angle-error", 60), "angle error 60°: it brings source or camera below"),
         (("plan", "white", "--criterion", "E"), "choose one of D, A"),
         (("plan", "white", "--instrument", "moon"), "no built-in instrument of that name"),
         (("plan", "white", "--instrument", "moon.toml"), "moon.toml"),
@@ -105,17 +107,20 @@ def test_geometries_below_the_horizon_are_told(run):
         (("plan", "white", "--smallest-bistatic", 150, "--largest-zenith", 60), "leave no camera position"),
         (("plan", "white", "--budget", 2, "--fix", "n", "--fix", "sigma"), "2 readings do not determine"),
         (("measure", "white", "white"), "two samples are called 'white'"),
-        (("measure", "white", "--calibration", "odd"), "choose one of reading, fixed, none"),
+        (("measure", "white", "--calibration-error", "odd"), "choose one of reading, fixed, none"),
         (("measure", "white", "--exposure", "long"), "--exposure: 'long' is not a number"),
         (("measure", "white", "--positions", "0"), "above 0° and below 180°"),
         (("measure", "white", "--source-radius", "60"), "angular radius"),
         (("measure", "white", "--source-polarization", "1,2"), "three numbers"),
-        (("measure", "white", "--angle-error", "-1"), "sample is"),
-        (("measure", "white", "--bits", "40"), "bits is 40"),
+        (("measure", "white", "--angle-error", "8"), "sample is 8°"),
+        (("measure", "white", "--wavelength", "-3"), "--wavelength -3: give a wavelength above 0"),
+        (("measure", "white", "--wavelength", "nan"), "--wavelength nan: give a wavelength above 0"),
         (("measure", "white", "--angles", "none.csv"), "none.csv"),
         (("measure", "white", "--angles", "none.csv", "--positions", "60"), "leave --positions"),
         (("measure", "white", "-o", "no/such"), "there is no folder no"),
     ],
 )
-def test_mistakes_are_one_line_and_leave_nothing_behind(refused, arguments, message):
+def test_mistakes_are_one_line_and_leave_nothing_behind(refused, tmp_path, arguments, message):
+    for folder in ("taken.csv", "drawn.png"):
+        (tmp_path / folder).mkdir()
     assert message in refused(*arguments)

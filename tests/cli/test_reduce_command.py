@@ -242,6 +242,9 @@ def test_zarr_is_replaced_as_a_whole(run, tmp_path, setup):
         (("--roi", "paint"), "--roi 'paint': give NAME=VALUE, for example --roi paint=100:200,150:260"),
         (("--roi", "paint=1:2"), "--roi paint: '1:2' is no region"),
         (("--roi", "paint=0:100,0:5"), "region 'paint'"),
+        (("--roi", "(whole picture)=0:5,0:5"), "region '(whole picture)': this cannot be its name"),
+        (("--roi", "two\nlines=0:5,0:5"), r"region 'two\nlines': this cannot be its name"),
+        (("--dark-level", "nan"), "--dark-level nan: give a number"),
         (("--angles", "angles.csv"), "--angles: say which part of the picture is the sample"),
         (("--angles", "few.csv", *ROI), "the angle table has no row for the series '2'"),
         (("--series", "1,1"), "series '1', '1': give one or more, each once"),
@@ -259,6 +262,28 @@ def test_mistakes_are_one_line_and_leave_nothing(refused, tmp_path, setup, optio
     (tmp_path / "few.csv").write_text("series,theta_i,theta_r\n1,10,20\n")
     polarimeter = () if "-p" in options else ("-p", "imager.toml")
     assert message in refused("reduce", "run.npy", *polarimeter, *options)
+
+
+@pytest.mark.parametrize("angles", ["0", "0, 60"])
+def test_states_that_do_not_determine_the_intensity_are_refused(refused, tmp_path, setup, angles):
+    raw, _ = setup
+    count = angles.count(",") + 1
+    np.save(tmp_path / "run.npy", raw[0, :count])
+    (tmp_path / "few.toml").write_text(
+        f"[polarimeter]\nkind = 'rotating_polarizer'\nangles = [{angles}]\n[detector]\nbits = 16\n"
+    )
+    message = refused("reduce", "run.npy", "-p", "few.toml")
+    assert f"its {count} state(s) {angles} do not determine the intensity: add states" in message
+    for command in (("plan", "white"), ("measure", "white")):
+        assert "do not determine the intensity" in refused(*command, "--instrument", "few.toml")
+
+
+def test_results_do_not_go_among_the_frames(refused, tmp_path, setup):
+    raw, names = setup
+    (tmp_path / "frames").mkdir()
+    write_png(tmp_path / "frames", raw[:1], names[:1], STATES)
+    message = refused("reduce", "frames", "-p", "imager.toml", "-o", "./frames/")
+    assert "--output frames: the frames are in this folder" in message
 
 
 def test_a_broken_picture_in_the_middle_leaves_nothing(refused, tmp_path, setup):

@@ -1,6 +1,6 @@
 import pytest
 
-from pbrdf.cli.values import angles, bounds, number, numbers, pairs, stokes_vector
+from pbrdf.cli.values import angles, bounds, number, numbers, pairs, share, stokes_vector
 from pbrdf.errors import PbrdfError
 
 
@@ -24,6 +24,7 @@ def test_names_and_values():
     assert numbers(["n=1.5", "k=-2e-1"], "--x", "n=1") == {"n": 1.5, "k": -0.2}
     assert bounds(["n=1:2"], "--x", "n=1:2") == {"n": (1.0, 2.0)}
     assert number(" 3 ", "--x") == 3.0
+    assert (share("10%", "--x"), share(" 0.1 ", "--x")) == (0.1, 0.1)
     assert stokes_vector("natural", "--x") == (1.0, 0.0, 0.0, 0.0)
     assert stokes_vector("1,0,0.5,0", "--x") == (1.0, 0.0, 0.5, 0.0)
 
@@ -43,3 +44,9 @@ def test_names_and_values():
 def test_wrong_texts_are_named(read, given):
     with pytest.raises(PbrdfError, match="--x"):
         read(given, "--x", "n=1")
+
+
+@pytest.mark.parametrize("text", ["", "%", "1%%", "ten%", "nan", "inf%"])
+def test_other_texts_are_no_shares(text):
+    with pytest.raises(PbrdfError, match="--x"):
+        share(text, "--x")

@@ -51,6 +51,12 @@ def test_forward_at_180_degrees(table):
     assert abs(read.phi[1]) == np.pi
 
 
+def test_a_line_states_radians_for_columns_without_a_unit(table):
+    read = table("# Angles: radians\nseries,theta_i,theta_r_deg,phi,wavelength\na,0.5,30,1,476")
+    assert (read.theta_i[0], read.phi[0], read.wavelength[0]) == (0.5, 1.0, 476.0)
+    assert read.theta_r[0] == pytest.approx(np.pi / 6)
+
+
 def test_writing_and_reading_again(tmp_path):
     table = AngleTable(
         ("p1_01", "p1_02", "x"),
@@ -103,6 +109,7 @@ def test_rows_of_some_series_in_their_order():
         ("series,theta_i,theta_r\na,90,2", "series 'a': theta_i is 90, it must be from 0° to below 90°"),
         ("series,theta_i,theta_r,exposure\na,9,2,0", "series 'a': exposure is 0, it must be more than 0"),
         ("# azimuth: backward=0\nseries,theta_i,theta_r\na,9,2", "use forward=0 or forward=180"),
+        ("# angles: gon\nseries,theta_i,theta_r\na,9,2", "angles is 'gon'; use degrees or radians"),
         ("series,theta_i,theta_r\n", "there are no rows"),
         ("series,theta_i,theta_r,theta_i_deg\na,1,2,3", "two columns are called theta_i"),
     ],

@@ -332,6 +332,24 @@ def test_a_file_cut_short(tmp_path):
         frames.read(0, 0, 64)
 
 
+def test_damaged_headers(tmp_path, capfd):
+    """Decoders raise what they like: struct.error, IndexError, ZeroDivisionError, TokenError."""
+    tifffile.imwrite(tmp_path / "good.tif", np.ones((4, 20, 30), np.uint16), photometric="minisblack")
+    tiff = (tmp_path / "good.tif").read_bytes()
+    np.save(tmp_path / "good.npy", np.ones((4, 20, 30), np.uint16))
+    npy = (tmp_path / "good.npy").read_bytes()
+    width = tiff.index(b"\x00\x01\x04\x00\x01\x00\x00\x00\x1e") + 8
+    for name, content in (
+        ("short.tif", tiff[:4]),
+        ("shorter.tif", tiff[:8]),
+        ("flat.tif", tiff[:width] + b"\0" + tiff[width + 1 :]),
+        ("bracket.npy", npy.replace(b"}  ", b"} )")),
+    ):
+        (tmp_path / name).write_bytes(content)
+        assert f"{name}: cannot be read as a picture" in refuse(tmp_path / name)
+    assert capfd.readouterr().err == ""
+
+
 def test_text_called_a_picture(tmp_path):
     for kind in ("png", "tif", "npy"):
         (tmp_path / f"run.{kind}").write_text("hello")

@@ -59,6 +59,8 @@ def test_toml(tmp_path):
         ("[a]\nrectangle = [1, 2, 3]", "region 'a': give rectangle"),
         ("[a]\nrectangle = [2, 1, 3, 4]", "region 'a': rectangle 2:1,3:4: give the smaller edge first"),
         ("[a]\ncircle = [1, 2, 3]", "region 'a': give rectangle"),
+        ("[a]\nellipse = [5, nan, 1, 1]", "region 'a': give rectangle"),
+        ("[a]\npolygon = [[0, 0], [5, 0], [0, inf]]", "region 'a': give rectangle"),
         ("a = 1", "region 'a': give rectangle"),
         ("[a]\nlabels = 'none.png'\nvalue = 1", "none.png: there is no such file"),
         ("[a", "not a TOML file"),

@@ -46,11 +46,11 @@ def test_one_kind_of_error_does_not_change_the_draws_of_another():
     ("make", "message"),
     [
         (lambda: Source(angular_radius=-0.1), "angular radius"),
-        (lambda: Source(angular_radius=1.0), "angular radius"),
+        (lambda: Source(angular_radius=1.0), "angular radius is 57.3°"),
         (lambda: Source(stability=np.nan), "stability"),
         (lambda: Source(polarisation=(0.9, 0.9, 0.0)), "together at most 1"),
-        (lambda: AngleErrors(sample=-1.0), "sample is -1.0"),
-        (lambda: AngleErrors(camera=0.5), "camera is 0.5"),
+        (lambda: AngleErrors(sample=-1.0), r"sample is -57\.3°, it must be within 0° … 5\.7°"),
+        (lambda: AngleErrors(camera=0.5), "camera is 28.6"),
     ],
 )
 def test_numbers_out_of_range_are_refused(make, message):

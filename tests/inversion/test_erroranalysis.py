@@ -10,7 +10,7 @@ import pytest
 import xarray as xr
 
 import pbrdf
-from pbrdf.inversion.erroranalysis import error_analysis, residual_structure
+from pbrdf.inversion.erroranalysis import _run_probabilities, error_analysis, residual_structure
 
 
 def by_hand(**changes):
@@ -117,6 +117,18 @@ def test_the_run_test_is_exact(positive, negative):
         assert structure.runs == count
         assert structure.p_runs == pytest.approx((runs <= count).mean(), rel=1e-12)
         assert structure.expected_runs == pytest.approx(1.0 + 2.0 * positive * negative / n)
+
+
+def test_the_run_test_takes_long_sequences():
+    """As many residuals as a table of a renderer has; Wald-Wolfowitz variance 2n₊n₋(2n₊n₋ − n)/(n²(n − 1))."""
+    positive, negative = 9000, 11000
+    n, product = positive + negative, 2.0 * positive * negative
+    probability = _run_probabilities(positive, negative)
+    number = np.arange(len(probability))
+    assert probability.sum() == pytest.approx(1.0)
+    mean = probability @ number
+    assert mean == pytest.approx(1.0 + product / n)
+    assert probability @ (number - mean) ** 2 == pytest.approx(product * (product - n) / (n**2 * (n - 1.0)))
 
 
 def test_runs_do_not_go_across_groups_and_zeros_are_left_out():

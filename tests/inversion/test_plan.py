@@ -20,6 +20,7 @@ from pbrdf.inversion.observations import Observations
 from pbrdf.inversion.plan import _angle_covariance, information, plan
 from pbrdf.inversion.problem import Space, residuals
 from pbrdf.inversion.solver import solve
+from pbrdf.optics.elements import rotate_frame
 
 THICK = load_paint("matte-white-thick")
 PAPER = replace(preset("paper"), detector=Detector(bits=12, gain=5.0, read_noise=20.0))
@@ -122,6 +123,29 @@ def test_errors_of_the_sample_angles_count_as_their_mean_square(protocol, tilts)
     radiance = [model.stokes(p.theta_i, p.theta_r, p.phi) * np.cos(p.theta_i)[:, None] for p in (many, moved)]
     error = ((radiance[1] - radiance[0]) / np.cos(many.theta_i)[:, None]).reshape(count, -1, 4)
     np.testing.assert_allclose(stated[:, 0, 0], np.square(error[..., 0]).mean(axis=0), rtol=0.2)
+
+
+def test_a_tilt_of_the_sample_turns_p_before_the_camera():
+    """Near normal view p turns by much more than the sample is tilted; the camera sees nothing of that."""
+    model, sigma, count = load_paint("white"), np.deg2rad(0.1), 2000
+    protocol = Protocol.two_axes(np.deg2rad(60.0), np.deg2rad([30.2, 33.0]), np.deg2rad([0.5]))
+    assert protocol.theta_r.min() < np.deg2rad(0.6)
+    space = space_of(model)
+    stated = _angle_covariance(space, unknowns_of(space, model), protocol, sigma)[0]
+    many = protocol.subset(np.tile(np.arange(len(protocol)), count))
+    turn, tilt = sigma * np.random.default_rng(0).standard_normal((2, len(many)))
+    moved = many.displaced(turn, 0.0, tilt)
+
+    def camera(p):
+        stokes = model.stokes(p.theta_i, p.theta_r, p.phi) * np.cos(p.theta_i)[:, None]
+        return np.einsum("gij,gj->gi", rotate_frame(p.reference_angle), stokes)
+
+    error = camera(moved) - camera(many)
+    error = np.einsum("gij,gj->gi", rotate_frame(-many.reference_angle), error)
+    error = (error / np.cos(many.theta_i)[:, None]).reshape(count, -1, 4)
+    expected = np.einsum("ngi,ngj->gij", error, error) / count
+    for k in (0, 1, 2):
+        np.testing.assert_allclose(stated[:, k, k], expected[:, k, k], rtol=0.2)
 
 
 # Against simulated measurements

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shlex
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -36,19 +37,26 @@ def measure(
     positions: Annotated[
         str | None,
         typer.Option(
-            help="Camera positions: bistatic angles between source and camera.", show_default=_POSITIONS
+            help="Camera positions: bistatic angles between source and camera, degrees.",
+            metavar="ANGLES",
+            show_default=_POSITIONS,
         ),
     ] = None,
     sample_angles: Annotated[
         str | None,
         typer.Option(
-            help="Angles between the sample's surface and the source: START:STOP:STEP or a list.",
+            help="Angles between the sample's surface and the source, degrees: START:STOP:STEP or a list.",
+            metavar="ANGLES",
             show_default="21 at each position, crowded to the mirror direction",
         ),
     ] = None,
     angle_table: Annotated[
         Path | None,
-        typer.Option("--angles", help="Take the geometries of an angle table instead, e.g. of `pbrdf plan`."),
+        typer.Option(
+            "--angles",
+            help="Take the geometries of an angle table instead, e.g. of `pbrdf plan`.",
+            metavar="FILE",
+        ),
     ] = None,
     instrument: Annotated[
         str,
@@ -58,7 +66,9 @@ def measure(
     ] = "paper",
     bits: Annotated[
         int | None,
-        typer.Option(help="Bits of the converter over the same range, instead of the instrument's."),
+        typer.Option(
+            help="Bits of the converter over the same range.", min=1, max=16, show_default="the instrument's"
+        ),
     ] = None,
     exposure: Annotated[
         str,
@@ -68,33 +78,46 @@ def measure(
             metavar="each|common|NUMBER",
         ),
     ] = "each",
-    calibration: Annotated[
+    calibration_error: Annotated[
         str,
         typer.Option(
             help="Errors of the instrument's stated accuracy: anew for each reading, fixed for all, or none.",
             metavar="reading|fixed|none",
         ),
     ] = "reading",
-    source_radius: Annotated[float, typer.Option(help="Angular radius of the source, degrees.")] = 0.0,
+    source_radius: Annotated[
+        float, typer.Option(help="Angular radius of the source, degrees.", min=0.0)
+    ] = 0.0,
     source_stability: Annotated[
         float | None,
-        typer.Option(help="Relative, from one geometry to the next.", show_default="the instrument's"),
+        typer.Option(
+            help="Relative, from one geometry to the next.", min=0.0, show_default="the instrument's"
+        ),
     ] = None,
     source_polarization: Annotated[
         str | None,
         typer.Option(help="Residual polarisation of the source, Q/I,U/I,V/I.", metavar="Q,U,V"),
     ] = None,
-    angle_error: Annotated[float, typer.Option(help="Of the sample angle at each geometry, degrees.")] = 0.0,
-    camera_error: Annotated[float, typer.Option(help="Of each camera position, degrees.")] = 0.0,
+    angle_error: Annotated[
+        float, typer.Option(help="Of the sample angle at each geometry, degrees.", min=0.0)
+    ] = 0.0,
+    camera_error: Annotated[float, typer.Option(help="Of each camera position, degrees.", min=0.0)] = 0.0,
     zero_error: Annotated[
-        float, typer.Option(help="Of the zero of the sample angle at each camera position, degrees.")
+        float, typer.Option(help="Of the zero of the sample angle at each camera position, degrees.", min=0.0)
     ] = 0.0,
     tilt_error: Annotated[
         float,
-        typer.Option(help="Of the sample's tilt out of the plane of incidence at each geometry, degrees."),
+        typer.Option(
+            help="Of the sample's tilt out of the plane of incidence at each geometry, degrees.", min=0.0
+        ),
     ] = 0.0,
-    pixels: Annotated[int, typer.Option(help="Side of the square of pixels that shows a sample.")] = 20,
-    wavelength: Annotated[float | None, typer.Option(help="Wavelength to write down, nm.")] = None,
+    patch: Annotated[int, typer.Option(help="Side of the square of pixels that shows a sample.", min=1)] = 20,
+    wavelength: Annotated[
+        float | None,
+        typer.Option(
+            help="Wavelength to write down.", metavar="NM", show_default="476 of bundled paints, else none"
+        ),
+    ] = None,
     seed: Annotated[int, typer.Option(help="Seed of all errors and noise.", min=0)] = 0,
     backend: Backend = None,
 ) -> None:
@@ -113,6 +136,8 @@ def measure(
     from pbrdf.instruments.source import AngleErrors, Source
     from pbrdf.instruments.virtual_experiment import VirtualExperiment
 
+    if wavelength is not None and not 0.0 < wavelength < math.inf:
+        raise PbrdfError(f"--wavelength {wavelength:g}: give a wavelength above 0 in nm")
     require_new(output)
     if backend is not None:
         pbrdf.set_backend(backend)
@@ -138,8 +163,8 @@ def measure(
         ),
         AngleErrors(*map(math.radians, (angle_error, camera_error, zero_error, tilt_error))),
         exposure=exposure if exposure in ("each", "common") else number(exposure, "--exposure"),
-        calibration=calibration,
-        patch=pixels,
+        calibration=calibration_error,
+        patch=patch,
         wavelength=wavelength,
         seed=seed,
     )
@@ -151,10 +176,9 @@ def measure(
         write_measurement(measurement, output, progress=progress)
     states = taken.polarimeter.size
     print(f"{output}: {len(protocol)} geometries, {states} states, {len(samples)} sample(s), simulated")
-    print(
-        f"Reduce with: pbrdf reduce {output}/frames --polarimeter {output}/polarimeter.toml "
-        f"--angles {output}/angles.csv --regions {output}/regions.toml"
-    )
+    words = ["pbrdf", "reduce", str(output / "frames"), "--polarimeter", str(output / "polarimeter.toml")]
+    words += ["--angles", str(output / "angles.csv"), "--regions", str(output / "regions.toml")]
+    print(f"Reduce with: {shlex.join(words)}")
 
 
 def _with_bits(detector: Detector, bits: int) -> Detector:

@@ -12,7 +12,7 @@ from pbrdf.cli.console import output_console, progress_bar
 from pbrdf.cli.fit import Backend
 from pbrdf.cli.instruments import open_instrument
 from pbrdf.cli.sources import open_model
-from pbrdf.cli.values import number, numbers, require_folder_of
+from pbrdf.cli.values import numbers, require_folder_of, share
 from pbrdf.errors import PbrdfError
 
 __all__ = ["plan"]
@@ -33,7 +33,10 @@ def plan(
     ] = Path("plan.csv"),
     budget: Annotated[int, typer.Option(help="Number of readings.", min=1)] = 63,
     criterion: Annotated[
-        str, typer.Option(help="D: joint confidence region; A: mean square of the relative standard errors.")
+        str,
+        typer.Option(
+            help="D: joint confidence region; A: mean square of the relative standard errors.", metavar="D|A"
+        ),
     ] = "D",
     out_of_plane: Annotated[
         bool,
@@ -120,7 +123,9 @@ def plan(
         raise PbrdfError("--noise and --instrument exclude each other: choose one")
     if output.suffix.lower() != ".csv":
         raise PbrdfError(f"--output {output}: the extension must be .csv")
-    require_folder_of(output)
+    picture = output.with_suffix(".png")
+    for file in (output, picture):
+        require_folder_of(file)
     if backend is not None:
         pbrdf.set_backend(backend)
     model = open_model(source)
@@ -141,7 +146,7 @@ def plan(
             fix=fix or (),
             free=free or (),
             weights=numbers(weight or (), "--weight", "n=2"),
-            uncertainty=_share(uncertainty),
+            uncertainty=share(uncertainty, "--uncertainty"),
             camera_positions=camera_positions,
             repeats=repeats,
             pixels=pixels,
@@ -149,7 +154,6 @@ def plan(
             seed=seed,
             progress=progress,
         )
-    picture = output.with_suffix(".png")
     save_figure(plan_figure(made, Path(source).name), picture)
     mounted = 0.0 if isinstance(taken, str) else taken.reference_angle
     write_angles(made.protocol.angle_table(reference_angle=mounted), output)
@@ -157,11 +161,3 @@ def plan(
     print(f"\nWritten: {output}, {picture}")
     if np.isinf(made.gain):
         print("The plan 3 × 21 does not determine these parameters at all.")
-
-
-def _share(text: str) -> float:
-    """A part like 0.1 or 10%."""
-    stripped = text.strip()
-    if stripped.endswith("%"):
-        return number(stripped[:-1], "--uncertainty") / 100.0
-    return number(stripped, "--uncertainty")

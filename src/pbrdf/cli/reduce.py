@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -33,7 +34,13 @@ def reduce(
         ),
     ],
     polarimeter: Annotated[
-        str, typer.Option("--polarimeter", "-p", help="The instrument's TOML file, or a built-in instrument.")
+        str,
+        typer.Option(
+            "--polarimeter",
+            "-p",
+            help="paper, conservative, sony_imx250mzr, or an instrument's TOML file.",
+            metavar="NAME|FILE",
+        ),
     ],
     output: Annotated[
         Path | None,
@@ -62,8 +69,10 @@ def reduce(
     series: Annotated[
         str | None, typer.Option(help="Take only these series, e.g. p1_01,p1_02.", metavar="NAMES")
     ] = None,
-    maps: Annotated[str, typer.Option(help="Stokes parameters of every pixel: nc, zarr or none.")] = "nc",
-    datasets: Annotated[str, typer.Option(help="Format of the data sets: csv or nc.")] = "csv",
+    maps: Annotated[
+        str, typer.Option(help="Format of the Stokes parameters of every pixel.", metavar="nc|zarr|none")
+    ] = "nc",
+    datasets: Annotated[str, typer.Option(help="Format of the data sets.", metavar="csv|nc")] = "csv",
     pictures: Annotated[
         bool, typer.Option("--pictures/--no-pictures", help="Draw S0, DoLP and AoLP.")
     ] = True,
@@ -75,7 +84,8 @@ def reduce(
         float, typer.Option(help="Pixels whose mean signal is not above this count as dark, digital numbers.")
     ] = 0.0,
     max_memory: Annotated[
-        str, typer.Option(help="Memory for frames and what is computed from them, e.g. 200MB or 2GB.")
+        str,
+        typer.Option(help="Memory for frames and what is computed from them, e.g. 200MB.", metavar="SIZE"),
     ] = "500MB",
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print the name of the folder only.")] = False,
 ) -> None:
@@ -90,6 +100,8 @@ def reduce(
     `pbrdf fit run-reduced/paint.csv`
     """
     memory = memory_size(max_memory, "--max-memory")
+    if not math.isfinite(dark_level):
+        raise PbrdfError(f"--dark-level {dark_level}: give a number")
     if maps not in ("nc", "zarr", "none"):
         raise PbrdfError(f"--maps {maps!r}: choose nc, zarr or none")
     if datasets not in ("csv", "nc"):
@@ -121,6 +133,10 @@ def reduce(
     folder = output or Path(
         f"{plain.name if plain.is_dir() and plain.suffix != '.zarr' else plain.stem}-reduced"
     )
+    if folder.resolve() == plain:
+        raise PbrdfError(
+            f"--output {folder}: the frames are in this folder; choose another one for the results"
+        )
     require_writable(folder)
     wanted = Wanted(None if maps == "none" else maps, pictures, chosen, table, f".{datasets}")
     with progress_bar(f"Reducing {frames}", quiet) as progress:

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from pbrdf.cli.console import output_console, stage_bar
-from pbrdf.cli.values import angles, number
+from pbrdf.cli.values import angles, share
 from pbrdf.errors import PbrdfError
 
 __all__ = ["reproduce"]
@@ -49,10 +49,18 @@ def reproduce(
         ),
     ] = 0.0,
     calibration_error: Annotated[
-        str, typer.Option(help="The imager's calibration errs at each reading anew, fixed, or none.")
+        str,
+        typer.Option(
+            help="The imager's calibration errs at each reading anew, fixed, or none.",
+            metavar="reading|fixed|none",
+        ),
     ] = "reading",
     exposure: Annotated[
-        str, typer.Option(help="One exposure for all angles of a sample (common), or for each angle (each).")
+        str,
+        typer.Option(
+            help="One exposure for all angles of a sample (common), or for each angle (each).",
+            metavar="common|each",
+        ),
     ] = "common",
     seed: Annotated[int, typer.Option(help="Seed of noise and starts.", min=0)] = 0,
     patch: Annotated[
@@ -105,6 +113,5 @@ def _noise(text: str | None) -> dict[str, float]:
             raise PbrdfError(
                 f"--noise {item!r}: give {', '.join(_NOISE)}, for example --noise linear=1%,read=20"
             )
-        share = value.endswith("%")
-        changed[_NOISE[name]] = number(value.rstrip("%"), f"--noise {name}") / (100.0 if share else 1.0)
+        changed[_NOISE[name]] = share(value, f"--noise {name}")
     return changed

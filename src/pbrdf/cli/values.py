@@ -8,7 +8,7 @@ from pathlib import Path
 
 from pbrdf.errors import PbrdfError
 
-__all__ = ["angles", "bounds", "number", "numbers", "pairs", "require_folder_of", "stokes_vector"]
+__all__ = ["angles", "bounds", "number", "numbers", "pairs", "require_folder_of", "share", "stokes_vector"]
 
 #: More values than this in one list are a slip of the pen.
 _MOST_VALUES = 100_000
@@ -29,6 +29,12 @@ def number(text: str, option: str) -> float:
     if not math.isfinite(value):
         raise PbrdfError(f"{option}: {text!r} is not a number")
     return value
+
+
+def share(text: str, option: str) -> float:
+    """A part such as 0.1 or 10%; raises PbrdfError as :func:`number` does."""
+    plain = text.strip()
+    return number(plain[:-1], option) / 100.0 if plain.endswith("%") else number(plain, option)
 
 
 def pairs(given: Sequence[str], option: str, example: str) -> dict[str, str]:
@@ -106,6 +112,14 @@ def stokes_vector(text: str, option: str) -> tuple[float, float, float, float]:
 
 
 def require_folder_of(file: Path) -> None:
-    """Check, before any work, that there is a folder for a file to be written into; raises PbrdfError."""
+    """Check, before any work, that a file can be put there: not without its folder, nor in place of one.
+
+    Raises
+    ------
+    PbrdfError
+        If it cannot. A folder ``.zarr`` may be in the place of a new one.
+    """
     if not file.parent.is_dir():
         raise PbrdfError(f"{file}: there is no folder {file.parent}")
+    if file.is_dir() and file.suffix.lower() != ".zarr":
+        raise PbrdfError(f"{file}: this is a folder; choose another name")

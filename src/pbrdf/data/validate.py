@@ -148,7 +148,7 @@ def validate(
     """
     errors = [issue for issue in check(ds, lines=lines, columns=columns) if issue.severity == "error"]
     if errors:
-        raise DataError("\n  ".join([f"{origin} does not follow the schema:", *map(str, errors)]))
+        raise DataError(f"{origin} does not follow the schema: {'; '.join(map(str, errors))}")
 
 
 def _error(variable: str, message: str, rows: NDArray[np.intp] | None = None) -> Issue:

@@ -8,8 +8,9 @@ A CSV file with one row a series, for example::
     p1_02,12,48,0,1,476,0.5
 
 ``series`` is the name by which the frames are called. Angles are in degrees, or in radians in a column whose name ends
-in ``_rad``. ``phi`` is the relative azimuth, 0 in the forward half-plane unless the line ``# azimuth: forward=180``
-says otherwise; without the column all was measured in the plane of incidence, and θ_r < 0 is on the side of the source.
+in ``_rad`` or after a line ``# angles: radians``. ``phi`` is the relative azimuth, 0 in the forward half-plane unless
+the line ``# azimuth: forward=180`` says otherwise; without the column all was measured in the plane of incidence, and
+θ_r < 0 is on the side of the source.
 Optional: ``group``; ``wavelength`` (nm); ``exposure``, the exposure time in any one unit, by which signals are divided;
 ``reference_angle``, in place of the instrument's, where the camera was turned between series; ``sample_angle``, how the
 sample stood (the paper's Angle_S_I), kept for the record.
@@ -149,7 +150,8 @@ def read_angles(path: str | Path) -> AngleTable:
     """
     path = Path(path)
     lines = read_lines(path)
-    forward_at_zero = _forward_at_zero(path, lines)
+    forward_at_zero = _stated(path, lines, "azimuth", ("forward=0", "forward=180")) == "forward=0"
+    usual = "rad" if _stated(path, lines, "angles", ("degrees", "radians")) == "radians" else "deg"
     body = [
         (number, line) for number, line in enumerate(lines, 1) if line.strip() and not line.startswith("#")
     ]
@@ -157,7 +159,7 @@ def read_angles(path: str | Path) -> AngleTable:
         raise DataError(f"{path}: there are no rows; give a line of column names and one row a series")
     delimiter = max(_DELIMITERS, key=body[0][1].count)
     rows = list(csv.reader((line for _, line in body), delimiter=delimiter, skipinitialspace=True))
-    columns = _columns(path, [name.strip() for name in rows[0]])
+    columns = _columns(path, [name.strip() for name in rows[0]], usual)
     for (number, _), cells in zip(body, rows, strict=True):
         if len(cells) != len(rows[0]):
             raise DataError(f"{path}: line {number}: {len(cells)} cells under {len(rows[0])} column names")
@@ -188,19 +190,20 @@ def read_angles(path: str | Path) -> AngleTable:
         raise DataError(f"{path}: {error}") from None
 
 
-def _forward_at_zero(path: Path, lines: Sequence[str]) -> bool:
+def _stated(path: Path, lines: Sequence[str], key: str, choices: tuple[str, str]) -> str:
+    """What the line ``# key: …`` states, the first choice where there is none."""
     for line in lines:
-        stated = re.fullmatch(r"#\s*azimuth\s*:(.*)", line.strip())
+        stated = re.fullmatch(rf"#\s*{key}\s*:(.*)", line.strip(), re.IGNORECASE)
         if stated:
-            text = stated[1].replace(" ", "")
-            if text not in ("forward=0", "forward=180"):
-                raise DataError(f"{path}: azimuth is {text!r}; use forward=0 or forward=180")
-            return text == "forward=0"
-    return True
+            text = stated[1].replace(" ", "").lower()
+            if text not in choices:
+                raise DataError(f"{path}: {key} is {text!r}; use {' or '.join(choices)}")
+            return text
+    return choices[0]
 
 
-def _columns(path: Path, names: list[str]) -> dict[str, tuple[int, str | None]]:
-    """Place and unit of each column that is known."""
+def _columns(path: Path, names: list[str], usual: str) -> dict[str, tuple[int, str | None]]:
+    """Place and unit of each column that is known; angles without one are in the usual unit."""
     found: dict[str, tuple[int, str | None]] = {}
     for index, name in enumerate(names):
         words = [word for word in re.split(r"[\s_.\-\[\]()]+", name.lower()) if word]
@@ -214,7 +217,7 @@ def _columns(path: Path, names: list[str]) -> dict[str, tuple[int, str | None]]:
             raise DataError(f"{path}: two columns are called {key}")
         if unit is not None and unit not in (("deg", "rad") if key in _ANGLES else ("nm",)):
             raise DataError(f"{path}: the unit of the column {name!r} is not understood")
-        found[key] = (index, unit)
+        found[key] = (index, unit or (usual if key in _ANGLES else None))
     for key in _NEEDED:
         if key not in found:
             raise DataError(f"{path}: there is no column {key}; the columns are {', '.join(names)}")

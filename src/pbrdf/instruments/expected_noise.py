@@ -73,7 +73,7 @@ def rounding_covariance(instrument: Instrument, signal: np.ndarray, pixels: int)
     ndarray
         Of the Stokes vector in the instrument's axes, shape (..., 4, 4); 0 for components that it does not see.
     """
-    W, detector = _mean_analyzer(instrument), instrument.detector
+    W, detector = instrument.polarimeter.mean_analyzer, instrument.detector
     variance = detector.variance(signal + detector.black)
     k = np.arange(1.0, 101.0).reshape(-1, *(1,) * np.ndim(signal))
     other = np.maximum(variance - 1.0 / 12.0, 0.0)
@@ -84,11 +84,6 @@ def rounding_covariance(instrument: Instrument, signal: np.ndarray, pixels: int)
     return (
         (1.0 - 1.0 / pixels) * (gain * np.moveaxis(common, 0, -1)[..., None, :]) @ np.swapaxes(gain, -1, -2)
     )
-
-
-def _mean_analyzer(instrument: Instrument) -> np.ndarray:
-    W = instrument.polarimeter.analyzer
-    return W.mean(axis=(0, 1)) if instrument.polarimeter.is_map else W
 
 
 def automatic_exposure(instrument: Instrument, brightest: ArrayLike, fill: float = FILL) -> np.ndarray:
@@ -163,7 +158,7 @@ def expected_covariance(
     stokes = np.asarray(stokes, dtype=float)
     turn = rotate_frame(np.broadcast_to(reference_angle, stokes.shape[:-1]))
     seen = np.einsum("...ij,...j->...i", turn, stokes)
-    W = _mean_analyzer(instrument)
+    W = instrument.polarimeter.mean_analyzer
     intensities = seen @ W.T
     if exposure is None:
         exposure = automatic_exposure(instrument, intensities.max(axis=-1))

@@ -168,7 +168,7 @@ class _Table:
                 where = f"[{name}] {key}" if name else f"[{key}]"
                 raise DataError(
                     f"{path}: {where}: {owner or 'this file'} has no {'key' if name else 'table'} {key!r}; "
-                    f"{hint}It may hold {', '.join(keys)}"
+                    f"{hint}it may hold {', '.join(keys)}"
                 )
 
     def wrong(self, key: str, need: str) -> DataError:

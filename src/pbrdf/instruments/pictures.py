@@ -6,6 +6,7 @@ compressed TIFF file can only be decoded whole: one such picture is then in memo
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -17,6 +18,9 @@ import numpy as np
 from pbrdf.errors import DataError
 
 __all__ = ["SUFFIXES", "PictureFile", "open_pictures"]
+
+# what tifffile has to say of a damaged file is said by the error that follows
+logging.getLogger("tifffile").addHandler(logging.NullHandler())
 
 SUFFIXES = (".png", ".tif", ".tiff", ".npy")
 #: Grey modes of Pillow and what they hold.
@@ -110,7 +114,7 @@ def _reading(path: Path) -> Iterator[None]:
         yield
     except DataError:
         raise
-    except (OSError, ValueError, SyntaxError, EOFError) as error:
+    except Exception as error:  # decoders raise anything over a damaged file
         # an operating system's error has a number, a library's a sentence of its own
         reason = error.strerror if isinstance(error, OSError) and error.strerror else error
         raise DataError(f"{path}: cannot be read as a picture: {reason}") from error

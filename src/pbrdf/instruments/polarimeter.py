@@ -108,11 +108,27 @@ class Polarimeter:
         """Whether the analyser vectors vary over the field of view."""
         return self.analyzer.ndim == 4
 
+    @property
+    def mean_analyzer(self) -> np.ndarray:
+        """Analyser vectors on the mean over the field of view, shape (N, 4)."""
+        return self.analyzer.mean(axis=(0, 1)) if self.is_map else self.analyzer
+
     @cached_property
     def determined(self) -> np.ndarray:
         """Which of I, Q, U, V the states determine everywhere in the field of view, shape (4,), bool."""
         known = determined_components(row_space(self.analyzer)).reshape(-1, 4)
         return np.asarray(known.all(axis=0))
+
+    def require_intensity(self) -> None:
+        """Check that the states determine I, without which there is nothing to reduce; raises DataError.
+
+        A map may have blind spots: their pixels are NaN.
+        """
+        if not (self.is_map or self.determined[0]):
+            raise DataError(
+                f"{self.name}: its {self.size} state(s) {', '.join(self.states)} do not determine the intensity: add "
+                "states"
+            )
 
     @property
     def is_described(self) -> bool:

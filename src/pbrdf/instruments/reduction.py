@@ -245,7 +245,6 @@ def _of_pixels(name: str, values: ArrayLike, shape: tuple[int, ...]) -> np.ndarr
     array = np.asarray(values, dtype=float)
     if array.shape not in ((), shape[1:], shape):
         raise DataError(f"{name} has the shape {array.shape}, the frames have {shape}")
-    states = shape[0] if array.shape == shape else 1
-    return np.broadcast_to(
-        array, (states, *shape[1:]) if states > 1 or array.ndim == 0 else shape[1:]
-    ).reshape(states, -1)
+    if array.ndim == 0:
+        return np.broadcast_to(array, (1, int(np.prod(shape[1:]))))
+    return array.reshape(shape[0] if array.shape == shape else 1, -1)

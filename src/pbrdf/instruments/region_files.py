@@ -66,8 +66,8 @@ def _refuse(text: str) -> Region:
     raise DataError(f"{text!r} is no region: give x0:x1,y0:y1, or ellipse:x,y,rx,ry, or polygon:x,y,x,y,x,y")
 
 
-def _finite(text: str) -> float:
-    value = float(text)
+def _finite(number: str | float) -> float:
+    value = float(number)
     if not math.isfinite(value):
         raise ValueError
     return value
@@ -79,7 +79,7 @@ def _span(text: str) -> tuple[str, str]:
 
 
 def _polygon(points: Sequence[Sequence[float]]) -> Polygon:
-    return Polygon(tuple((float(x), float(y)) for x, y in points))
+    return Polygon(tuple((_finite(x), _finite(y)) for x, y in points))
 
 
 def read_regions(path: str | Path) -> dict[str, Region]:
@@ -133,10 +133,10 @@ def _from_toml(path: Path) -> dict[str, Region]:
 def _from_table(table: Any, folder: Path) -> Region:
     keys = set(table)
     if keys == {"rectangle"}:
-        x0, x1, y0, y1 = map(float, table["rectangle"])
+        x0, x1, y0, y1 = map(_finite, table["rectangle"])
         return Rectangle(x0, x1, y0, y1)
     if keys == {"ellipse"}:
-        x, y, rx, ry = map(float, table["ellipse"])
+        x, y, rx, ry = map(_finite, table["ellipse"])
         return Ellipse(x, y, rx, ry)
     if keys == {"polygon"}:
         return _polygon(table["polygon"])

@@ -325,9 +325,7 @@ class RegionSum:
             nothing = np.full((4, 4), np.nan)
             return RegionAverage(nothing[0], nothing, nothing.copy(), nothing[0].copy(), self.pixels, counts)
         stokes = used.mean
-        analyzer = instrument.polarimeter.analyzer
-        analyzer = analyzer.mean(axis=(0, 1)) if analyzer.ndim == 4 else analyzer
-        noise = used.covariance / used.count**2
-        noise = noise + rounding_covariance(instrument, analyzer @ np.nan_to_num(stokes), used.count)
+        signal = instrument.polarimeter.mean_analyzer @ np.nan_to_num(stokes)
+        noise = used.covariance / used.count**2 + rounding_covariance(instrument, signal, used.count)
         covariance = noise + systematic_covariance(instrument, stokes)
         return RegionAverage(stokes, covariance, noise, used.scatter, self.pixels, counts)

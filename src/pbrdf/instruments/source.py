@@ -17,6 +17,9 @@ from pbrdf.instruments.goniometer import Protocol
 
 __all__ = ["AngleErrors", "Source"]
 
+#: Largest angular radius of a source, and largest standard deviation of an angle, radians.
+_WIDEST, _LARGEST_ERROR = 0.5, 0.1
+
 
 @dataclass(frozen=True)
 class Source:
@@ -39,9 +42,10 @@ class Source:
     polarisation: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.angular_radius) and 0.0 <= self.angular_radius <= 0.5):
+        if not (math.isfinite(self.angular_radius) and 0.0 <= self.angular_radius <= _WIDEST):
             raise DataError(
-                f"source: its angular radius is {self.angular_radius!r}, it must be within 0 … 0.5 radians"
+                f"source: its angular radius is {math.degrees(self.angular_radius):.4g}°, it must be within "
+                f"0° … {math.degrees(_WIDEST):.1f}°"
             )
         if not (math.isfinite(self.stability) and 0.0 <= self.stability < 1.0):
             raise DataError(f"source: its stability is {self.stability!r}, it must be from 0 to below 1")
@@ -86,8 +90,11 @@ class AngleErrors:
     def __post_init__(self) -> None:
         for field in fields(self):
             value = getattr(self, field.name)
-            if not (math.isfinite(value) and 0.0 <= value <= 0.1):
-                raise DataError(f"angle errors: {field.name} is {value!r}, it must be within 0 … 0.1 radians")
+            if not (math.isfinite(value) and 0.0 <= value <= _LARGEST_ERROR):
+                raise DataError(
+                    f"angle errors: that of the {field.name} is {math.degrees(value):.4g}°, it must be within "
+                    f"0° … {math.degrees(_LARGEST_ERROR):.1f}°"
+                )
 
     def apply(self, protocol: Protocol, rng: np.random.Generator) -> Protocol:
         """The geometries that there really are when those of a protocol are set.

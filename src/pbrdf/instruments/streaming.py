@@ -89,13 +89,14 @@ def reduced_blocks(
     Raises
     ------
     DataError
-        If the frames do not fit the instrument; names the series.
+        If the frames do not fit the instrument, or it does not determine the intensity; names the series.
     """
     if frames.states != instrument.polarimeter.size:
         raise DataError(
             f"{frames.states} frames a series for the {instrument.polarimeter.size} states of "
             f"{instrument.polarimeter.name}"
         )
+    instrument.polarimeter.require_intensity()
     corrections = Corrections.of(instrument, frames)
     top, bottom = rows if rows is not None else (0, frames.rows)
     threads, high = _shares(frames, max_memory)

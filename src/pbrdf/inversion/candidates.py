@@ -104,6 +104,6 @@ def _sample_angles(
 
 def _within(protocol: Protocol, zenith: float) -> Protocol:
     keep = np.maximum(protocol.theta_i, protocol.theta_r) <= zenith + 1e-9
-    # a source beyond the normal is the mirror image of a camera beyond it
+    # a source beyond the normal tells nearly what a camera beyond it does, by reciprocity (2 % of the gain)
     keep &= ~(protocol.sample_angle > 0.5 * np.pi + 1e-9)
     return protocol.subset(keep)

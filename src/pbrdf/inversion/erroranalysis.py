@@ -353,10 +353,17 @@ def residual_structure(sequences: Sequence[np.ndarray]) -> Structure:
 def _sign_test(positive: int, negative: int) -> float:
     """Two-sided binomial test of p = ½; both tails are equal."""
     total, fewer = positive + negative, min(positive, negative)
-    log_factorial = np.concatenate([[0.0], np.cumsum(np.log(np.arange(1, total + 1)))])
-    k = np.arange(fewer + 1)
-    tail = log_factorial[total] - log_factorial[k] - log_factorial[total - k] - total * math.log(2.0)
+    tail = _log_choices(total, np.arange(fewer + 1)) - total * math.log(2.0)
     return min(1.0, 2.0 * float(np.exp(tail).sum()))
+
+
+def _log_choices(total: int, chosen: np.ndarray) -> np.ndarray:
+    """Logarithms of the numbers of ways to choose so many of a total; −∞ where there is none."""
+    log_factorial = np.concatenate([[0.0], np.cumsum(np.log(np.arange(1, total + 1)))])
+    k = np.minimum(chosen, total)
+    return np.where(
+        chosen <= total, log_factorial[total] - log_factorial[k] - log_factorial[total - k], -np.inf
+    )
 
 
 def _run_probabilities(positive: int, negative: int) -> np.ndarray:
@@ -365,16 +372,18 @@ def _run_probabilities(positive: int, negative: int) -> np.ndarray:
         return np.array([0.0, 1.0])
     most = 2 * min(positive, negative) + (positive != negative)
     probability = np.zeros(most + 1)
-    orders = math.comb(positive + negative, positive)
+    half = np.arange(1, min(positive, negative) + 1)
+    total = positive + negative
+    orders = float(_log_choices(total, np.array(positive)))
 
-    def ways(parts_above: int, parts_below: int) -> int:
-        return math.comb(positive - 1, parts_above - 1) * math.comb(negative - 1, parts_below - 1)
+    def share(parts_above: np.ndarray, parts_below: np.ndarray) -> np.ndarray:
+        ways = _log_choices(positive - 1, parts_above - 1) + _log_choices(negative - 1, parts_below - 1)
+        return np.exp(ways - orders)
 
-    for count in range(2, most + 1):
-        half = count // 2
-        # the first run may be of either sign; an odd number of runs has one more of the first sign
-        number = 2 * ways(half, half) if count % 2 == 0 else ways(half + 1, half) + ways(half, half + 1)
-        probability[count] = number / orders
+    # the first run may be of either sign; an odd number of runs has one more of the first sign
+    probability[2::2] = 2.0 * share(half, half)
+    odd = share(half + 1, half) + share(half, half + 1)
+    probability[3::2] = odd[: len(probability[3::2])]
     return probability
 
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from pbrdf.errors import FitError
+from pbrdf.errors import DataError, FitError
 from pbrdf.instruments.expected_noise import expected_covariance
 from pbrdf.instruments.goniometer import Protocol
 from pbrdf.instruments.instrument import Instrument
@@ -33,6 +33,7 @@ from pbrdf.inversion.observations import Observations
 from pbrdf.inversion.problem import Space, derivatives
 from pbrdf.inversion.statistics import covariance, prior_spread
 from pbrdf.models.base import Model
+from pbrdf.optics.elements import rotate_frame
 
 __all__ = ["Plan", "information", "plan"]
 
@@ -281,6 +282,7 @@ def information(
     cos_i = np.cos(data.theta_i)
     seen = np.arange(4)
     if isinstance(noise, Instrument):
+        noise.polarimeter.require_intensity()
         seen = np.flatnonzero(noise.polarimeter.determined)
         spread = expected_covariance(
             noise,
@@ -316,15 +318,25 @@ def _angle_covariance(
     moves = [(angle_error, 0.0)]
     if (np.abs(np.sin(protocol.phi)) > 1e-6).any():
         moves.append((0.0, angle_error))
-    places = [(protocol.displaced(-a, 0.0, -b), protocol.displaced(a, 0.0, b)) for a, b in moves]
+    try:
+        places = [(protocol.displaced(-a, 0.0, -b), protocol.displaced(a, 0.0, b)) for a, b in moves]
+    except DataError:
+        raise FitError(
+            f"angle error {math.degrees(angle_error):g}°: it brings source or camera below the horizon; state a "
+            "smaller one, or stay farther from the horizon (largest zenith angle)"
+        ) from None
     cos_i = np.cos(protocol.theta_i)[:, None]
     found = np.zeros((len(unknowns), len(protocol), 4, 4))
     for total, values in zip(found, space.to_parameters(unknowns), strict=True):
         model = space.build(values)
 
         def seen(p: Protocol, model: Model = model) -> np.ndarray:
-            """As if it were measured at the nominal angle of incidence."""
-            return np.asarray(model.stokes(p.theta_i, p.theta_r, p.phi)) * np.cos(p.theta_i)[:, None] / cos_i
+            """As the camera sees it, taken for light of the nominal geometry: its angle of incidence, its p."""
+            stokes = (
+                np.asarray(model.stokes(p.theta_i, p.theta_r, p.phi)) * np.cos(p.theta_i)[:, None] / cos_i
+            )
+            turn = rotate_frame(p.reference_angle - protocol.reference_angle)
+            return np.einsum("gij,gj->gi", turn, stokes)
 
         here = seen(protocol)
         for before, after in places:

@@ -182,6 +182,8 @@ def _file_names(regions: Mapping[str, Region]) -> dict[str, str]:
     """What the files of regions are called, without extension."""
     found: dict[str, str] = {}
     for region in regions:
+        if region == WHOLE_PICTURE or not region.isprintable():
+            raise DataError(f"region {region!r}: this cannot be its name: choose another")
         safe = safe_name(region)
         if safe in found.values() or safe in ("summary", "stokes"):
             raise DataError(f"region {region!r}: its file {safe!r} would be another's: choose another name")
