@@ -61,7 +61,10 @@ def measure(
     instrument: Annotated[
         str,
         typer.Option(
-            help="paper, conservative, sony_imx250mzr, or an instrument's TOML file.", metavar="NAME|FILE"
+            "--instrument",
+            "--polarimeter",
+            help="paper, conservative, sony_imx250mzr, or an instrument's TOML file.",
+            metavar="NAME|FILE",
         ),
     ] = "paper",
     bits: Annotated[

@@ -45,6 +45,8 @@ def plan(
     instrument: Annotated[
         str | None,
         typer.Option(
+            "--instrument",
+            "--polarimeter",
             help="paper, conservative, sony_imx250mzr, or an instrument's TOML file.",
             metavar="NAME|FILE",
             show_default="paper",

@@ -338,9 +338,7 @@ def _fitted(
 def _in_cells(polarimeter: Polarimeter, shape: tuple[int, int]) -> Polarimeter:
     """The nominal instrument with one set of analyser vectors, or a map of these cells."""
     if shape == (1, 1):
-        if not polarimeter.is_map:
-            return polarimeter
-        return replace(polarimeter, analyzer=polarimeter.analyzer.mean(axis=(0, 1)))
+        return replace(polarimeter, analyzer=polarimeter.mean_analyzer)
     if polarimeter.is_map:
         return replace(polarimeter, analyzer=polarimeter.spread(*shape))
     return replace(polarimeter, analyzer=np.tile(polarimeter.analyzer, (*shape, 1, 1)))
@@ -351,8 +349,7 @@ def _with_flat_transmittance(instrument: Instrument) -> Instrument:
     frames, polarimeter = instrument.frames, instrument.polarimeter
     if polarimeter.mosaic is None or "flat_field" not in frames or "flat_transmittance" in frames:
         return instrument
-    through = polarimeter.analyzer[..., 0]
-    through = through.mean(axis=(0, 1)) if polarimeter.is_map else through
+    through = polarimeter.mean_analyzer[:, 0]
     return replace(instrument, frames={**frames, "flat_transmittance": through.tolist()})
 
 
