@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-pytest.importorskip("mitsuba", reason="rendering needs mitsuba: pip install 'pbrdf[render]'")
+pytest.importorskip("mitsuba", reason="rendering needs mitsuba: pip install 'mitsuba>=3.9'")
 
 SMALL = ("--size", "24x16", "--spp", "32", "--quiet")
 PAINT = {

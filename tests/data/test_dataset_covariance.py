@@ -261,7 +261,7 @@ def test_strangers_name_covariances_in_either_order_and_variances_for_uncertaint
 
 def test_mistakes_in_a_table_are_named_by_their_line(text_file):
     path = text_file(FILE.format("p-s").replace(".001,", "0.02,"))
-    with pytest.raises(DataError, match=r"data\.csv.*\n.*covariance, line 5: .* \(I, Q\), is 2"):
+    with pytest.raises(DataError, match=r"data\.csv.*covariance, line 5: .* \(I, Q\), is 2"):
         read(path)
     with pytest.raises(DataError, match="there are no rows"):
         read(path, skip_invalid=True)
@@ -278,5 +278,5 @@ def test_a_strangers_netcdf_without_axes_or_uncertainties(ds, tmp_path):
     bare.to_netcdf(tmp_path / "bare.nc", engine="h5netcdf")
     assert_array_equal(read(tmp_path / "bare.nc")["covariance"], ds["covariance"])
     bare.drop_vars("U_std").to_netcdf(tmp_path / "bare.nc", engine="h5netcdf")
-    with pytest.raises(DataError, match=r"bare\.nc .*\n.* rows 0, 1, 2: .* but U_std is not stated"):
+    with pytest.raises(DataError, match=r"bare\.nc .* rows 0, 1, 2: .* but U_std is not stated"):
         read(tmp_path / "bare.nc")

@@ -24,7 +24,7 @@ D = np.diag([1.0, -1.0, -1.0, -1.0])
 
 def use(variant):
     """Mitsuba with a variant active and the plugin known, or skip the test."""
-    mi = pytest.importorskip("mitsuba", reason="rendering needs mitsuba: pip install 'pbrdf[render]'")
+    mi = pytest.importorskip("mitsuba", reason="rendering needs mitsuba: pip install 'mitsuba>=3.9'")
     import drjit as dr
 
     import pbrdf.rendering

@@ -123,7 +123,7 @@ def test_the_table_is_filled_below_the_horizon(coarse):
 
 
 def plain_mitsuba():
-    mi = pytest.importorskip("mitsuba", reason="Mitsuba is not installed: pip install 'pbrdf[render]'")
+    mi = pytest.importorskip("mitsuba", reason="Mitsuba is not installed: pip install 'mitsuba>=3.9'")
     mi.set_variant("llvm_ad_mono_polarized")
     return mi
 

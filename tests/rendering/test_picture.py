@@ -8,7 +8,7 @@ import pytest
 from pbrdf.errors import DataError
 from pbrdf.rendering.picture import StokesPicture, read_exr, write_exr
 
-pytest.importorskip("mitsuba", reason="OpenEXR files are written by mitsuba: pip install 'pbrdf[render]'")
+pytest.importorskip("mitsuba", reason="OpenEXR files are written by mitsuba: pip install 'mitsuba>=3.9'")
 
 
 @pytest.fixture

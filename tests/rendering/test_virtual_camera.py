@@ -47,7 +47,7 @@ def ball(mi, lamp):
 @pytest.fixture(scope="module")
 def measured():
     """Pictures and geometry by lamp."""
-    pytest.importorskip("mitsuba", reason="rendering needs mitsuba: pip install 'pbrdf[render]'")
+    pytest.importorskip("mitsuba", reason="rendering needs mitsuba: pip install 'mitsuba>=3.9'")
     mi = start_mitsuba()
     scenes = {name: ball(mi, list(lamp)) for name, lamp in LAMPS.items()}
     pictures = {name: render_stokes(scene, spp=144, depth=2) for name, scene in scenes.items()}

@@ -32,9 +32,7 @@ def register() -> None:
     try:
         import mitsuba as mi
     except ImportError as error:
-        raise BackendError(
-            f"rendering needs Mitsuba 3.9 or newer: pip install 'pbrdf[render]' ({error})"
-        ) from error
+        raise BackendError(f"rendering needs Mitsuba: pip install 'mitsuba>=3.9' ({error})") from error
     if mi.variant() is not None:
         _register_in_active_variant()
     if not _following:

@@ -35,9 +35,7 @@ def start_mitsuba(variant: str = DEFAULT_VARIANT) -> Any:
     try:
         import mitsuba as mi
     except ImportError as error:
-        raise BackendError(
-            f"rendering needs Mitsuba 3.9 or newer: pip install 'pbrdf[render]' ({error})"
-        ) from error
+        raise BackendError(f"rendering needs Mitsuba: pip install 'mitsuba>=3.9' ({error})") from error
     polarised = [
         name for name in mi.variants() if name.endswith("_polarized") and not name.startswith("scalar")
     ]
