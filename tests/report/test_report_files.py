@@ -9,7 +9,7 @@ import xarray as xr
 import pbrdf
 from pbrdf.errors import DataError
 from pbrdf.report import files
-from pbrdf.report.files import comparison_file, fit_record, require_writable, write_report
+from pbrdf.report.files import comparison_file, complete_folder, fit_record, require_writable, write_report
 
 NAMES = {"summary.txt", "figure.png", "model.json", "fit.json", "comparison.nc", "starts.png"}
 
@@ -99,3 +99,25 @@ def test_a_folder_is_tried_without_a_trace(tmp_path):
         require_writable(tmp_path / "file")
     with pytest.raises(DataError, match="cannot be written"):
         require_writable(tmp_path / "file" / "fit")
+
+
+def test_a_folder_that_is_there_is_filled_but_a_zarr_store_in_it_is_replaced_as_a_whole(tmp_path):
+    """Pieces of an old store among those of the new one would be read as data."""
+    for name, text in (
+        ("figures/mine.txt", "mine"),
+        ("figures/a.txt", "old"),
+        ("maps.zarr/c/9", "old piece"),
+    ):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    with complete_folder(tmp_path) as folder:
+        for name in ("figures/a.txt", "maps.zarr/c/0", "summary.txt"):
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            (folder / name).write_text("new")
+    found = {str(p.relative_to(tmp_path)): p.read_text() for p in tmp_path.rglob("*") if p.is_file()}
+    assert found == {
+        "figures/mine.txt": "mine",
+        "figures/a.txt": "new",
+        "maps.zarr/c/0": "new",
+        "summary.txt": "new",
+    }

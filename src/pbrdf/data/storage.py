@@ -23,6 +23,7 @@ __all__ = [
     "decode_attribute",
     "encode_attribute",
     "exact_degrees",
+    "name_beside",
     "plain_attributes",
     "read_lines",
 ]
@@ -50,6 +51,11 @@ def read_lines(path: Path) -> list[str]:
     return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
 
 
+def name_beside(path: Path) -> Path:
+    """A new hidden name in the folder of `path`, for what is to take its place once it is complete."""
+    return path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
+
+
 @contextmanager
 def atomic_target(path: Path) -> Iterator[Path]:
     """A name beside `path` to write to; it replaces `path` when the block ends well, and goes otherwise.
@@ -59,7 +65,7 @@ def atomic_target(path: Path) -> Iterator[Path]:
     DataError
         If the folder does not exist or cannot be written to.
     """
-    beside = path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
+    beside = name_beside(path)
     try:
         yield beside
         beside.replace(path)
@@ -80,7 +86,7 @@ def atomic_folder(path: Path) -> Iterator[Path]:
         If the folder cannot be written.
     """
     resolved = path.resolve()
-    beside, old = (resolved.with_name(f".{resolved.name}.{secrets.token_hex(4)}.tmp") for _ in range(2))
+    beside, old = name_beside(resolved), name_beside(resolved)
     try:
         yield beside
         if resolved.exists():

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import secrets
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -14,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import pbrdf
-from pbrdf.data.storage import exact_degrees
+from pbrdf.data.storage import exact_degrees, name_beside
 from pbrdf.errors import DataError
 from pbrdf.report.describe import shown_unit
 from pbrdf.report.numbers import plain
@@ -48,7 +47,7 @@ def require_writable(directory: Path) -> None:
     """
     if directory.exists() and not directory.is_dir():
         raise DataError(f"{directory}: there is a file of that name; choose another folder with --output")
-    trial = _beside(directory)
+    trial = name_beside(directory.resolve())
     missing = [p for p in directory.parents if not p.exists()]
     try:
         trial.mkdir(parents=True)
@@ -114,15 +113,12 @@ def complete_folder(directory: Path) -> Iterator[Path]:
     DataError
         If the folder cannot be written.
     """
-    temporary = _beside(directory)
+    temporary = name_beside(directory.resolve())
     try:
         temporary.mkdir(parents=True)
         yield temporary
         if directory.is_dir():
-            for file in sorted(path for path in temporary.rglob("*") if path.is_file()):
-                target = directory / file.relative_to(temporary)
-                target.parent.mkdir(parents=True, exist_ok=True)
-                file.replace(target)
+            _move_into(temporary, directory)
         else:
             temporary.rename(directory)
     except OSError as error:
@@ -131,9 +127,17 @@ def complete_folder(directory: Path) -> Iterator[Path]:
         shutil.rmtree(temporary, ignore_errors=True)
 
 
-def _beside(directory: Path) -> Path:
-    resolved = directory.resolve()
-    return resolved.with_name(f".{resolved.name}.{secrets.token_hex(4)}.tmp")
+def _move_into(folder: Path, target: Path) -> None:
+    """Move what a folder holds; folders of the same name are filled, but one of Zarr is one thing and is replaced."""
+    for entry in sorted(folder.iterdir()):
+        place = target / entry.name
+        if entry.is_dir() and entry.suffix != ".zarr":
+            place.mkdir(exist_ok=True)
+            _move_into(entry, place)
+        else:
+            if entry.is_dir() and place.is_dir():
+                shutil.rmtree(place)
+            entry.replace(place)
 
 
 def fit_record(report: Report) -> dict[str, Any]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import secrets
-import shutil
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, field
@@ -21,6 +19,7 @@ from pbrdf.instruments.regions import Rectangle, Region, RegionAverage
 from pbrdf.instruments.series import RegionCollector, datasets_of_averages, require_same_series
 from pbrdf.instruments.stokes_maps import MapWriter, pixel_maps
 from pbrdf.instruments.streaming import DEFAULT_MEMORY, Block, reduced_blocks
+from pbrdf.report.files import complete_folder
 from pbrdf.report.gallery import Gallery, safe_name
 from pbrdf.report.picture_sums import BlockSums
 from pbrdf.report.reduction_summary import write_averages
@@ -112,10 +111,8 @@ def write_reduction(
     file_names = _file_names(wanted.regions)
     if wanted.angles is not None:
         require_same_series(frames.names, wanted.angles)
-    temporary = directory.resolve().with_name(f".{directory.resolve().name}.{secrets.token_hex(4)}.tmp")
     names: list[str] = []
-    try:
-        temporary.mkdir(parents=True)
+    with complete_folder(directory) as temporary:
         gallery = Gallery(frames, temporary, name, wanted.regions) if wanted.pictures else None
         with ExitStack() as stack:
             maps: MapWriter | None = None
@@ -159,23 +156,7 @@ def write_reduction(
         if gallery is not None:
             gallery.close()
             names += gallery.files
-        _put_in_place(temporary, directory, names)
-    except OSError as error:
-        raise DataError(f"{directory}: cannot be written: {error.strerror or error}") from error
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
     return Reduction(averages, [directory / n for n in names])
-
-
-def _put_in_place(temporary: Path, directory: Path, names: list[str]) -> None:
-    if not directory.is_dir():
-        temporary.rename(directory)
-        return
-    for name in names:
-        target = directory / name
-        if target.is_dir():
-            shutil.rmtree(target)
-        (temporary / name).replace(target)
 
 
 def _file_names(regions: Mapping[str, Region]) -> dict[str, str]:
