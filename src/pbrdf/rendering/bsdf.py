@@ -11,9 +11,9 @@ from typing import Any
 import drjit as dr
 
 from pbrdf.backend import check_llvm
-from pbrdf.errors import BackendError
 from pbrdf.rendering.properties import PLUGIN, read_properties
 from pbrdf.rendering.surface import Surface
+from pbrdf.rendering.variant import import_mitsuba
 
 __all__ = ["register"]
 
@@ -29,10 +29,7 @@ def register() -> None:
         If Mitsuba is not installed, or Dr.Jit has loaded an LLVM that aborts the process.
     """
     global _following
-    try:
-        import mitsuba as mi
-    except ImportError as error:
-        raise BackendError(f"rendering needs Mitsuba: pip install 'mitsuba>=3.9' ({error})") from error
+    mi = import_mitsuba()
     if mi.variant() is not None:
         _register_in_active_variant()
     if not _following:

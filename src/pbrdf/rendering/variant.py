@@ -6,9 +6,18 @@ from typing import Any
 
 from pbrdf.errors import BackendError
 
-__all__ = ["DEFAULT_VARIANT", "start_mitsuba"]
+__all__ = ["DEFAULT_VARIANT", "import_mitsuba", "start_mitsuba"]
 
 DEFAULT_VARIANT = "llvm_ad_mono_polarized"
+
+
+def import_mitsuba() -> Any:
+    """The module ``mitsuba``; raises BackendError if it is not installed."""
+    try:
+        import mitsuba
+    except ImportError as error:
+        raise BackendError(f"rendering needs Mitsuba: pip install 'mitsuba>=3.9' ({error})") from error
+    return mitsuba
 
 
 def start_mitsuba(variant: str = DEFAULT_VARIANT) -> Any:
@@ -32,10 +41,7 @@ def start_mitsuba(variant: str = DEFAULT_VARIANT) -> Any:
         If Mitsuba is not installed, does not have that variant, the variant knows no polarisation, or LLVM or CUDA is
         missing.
     """
-    try:
-        import mitsuba as mi
-    except ImportError as error:
-        raise BackendError(f"rendering needs Mitsuba: pip install 'mitsuba>=3.9' ({error})") from error
+    mi = import_mitsuba()
     polarised = [
         name for name in mi.variants() if name.endswith("_polarized") and not name.startswith("scalar")
     ]
