@@ -33,6 +33,7 @@ from pbrdf.data.conventions import azimuth_forward_pi_to_zero
 from pbrdf.data.storage import atomic_target, exact_degrees, read_lines
 from pbrdf.errors import DataError
 from pbrdf.instruments.frames import named
+from pbrdf.instruments.series_rows import series_rows
 
 __all__ = ["AngleTable", "read_angles", "write_angles"]
 
@@ -48,7 +49,6 @@ _UNITS = {
     "radians": "rad",
     "nm": "nm",
 }
-_DELIMITERS = ",;\t"
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,22 +152,14 @@ def read_angles(path: str | Path) -> AngleTable:
     lines = read_lines(path)
     forward_at_zero = _stated(path, lines, "azimuth", ("forward=0", "forward=180")) == "forward=0"
     usual = "rad" if _stated(path, lines, "angles", ("degrees", "radians")) == "radians" else "deg"
-    body = [
-        (number, line) for number, line in enumerate(lines, 1) if line.strip() and not line.startswith("#")
-    ]
-    if len(body) < 2:
-        raise DataError(f"{path}: there are no rows; give a line of column names and one row a series")
-    delimiter = max(_DELIMITERS, key=body[0][1].count)
-    rows = list(csv.reader((line for _, line in body), delimiter=delimiter, skipinitialspace=True))
-    columns = _columns(path, [name.strip() for name in rows[0]], usual)
-    for (number, _), cells in zip(body, rows, strict=True):
-        if len(cells) != len(rows[0]):
-            raise DataError(f"{path}: line {number}: {len(cells)} cells under {len(rows[0])} column names")
+    names, found = series_rows(path, lines)
+    columns = _columns(path, names, usual)
+    rows = list(found)
 
     def cells_of(name: str) -> Iterator[tuple[str, str]]:
         index, _ = columns[name]
-        for (number, _), cells in zip(body[1:], rows[1:], strict=True):
-            yield cells[index].strip(), f"{path}: line {number}, column {rows[0][index].strip()!r}"
+        for number, cells in rows:
+            yield cells[index], f"{path}: line {number}, column {names[index]!r}"
 
     values: dict[str, Any] = {}
     for name, (_, unit) in columns.items():

@@ -32,11 +32,11 @@ from pbrdf.data.storage import atomic_target, read_lines
 from pbrdf.errors import DataError
 from pbrdf.instruments.frames import named
 from pbrdf.instruments.polarimeter import STOKES
+from pbrdf.instruments.series_rows import series_rows
 
 __all__ = ["InputTable", "ellipse", "read_input_table", "write_input_table"]
 
 _ELLIPSE = ("angle_deg", "ellipticity_deg", "handedness", "dop", "intensity")
-_DELIMITERS = ",;\t"
 #: A Stokes vector may be more than fully polarised by this share: rounding of what someone typed.
 _ROUNDING = 1e-3
 
@@ -122,23 +122,12 @@ def read_input_table(path: str | Path) -> InputTable:
         Names the file, and the line and the column where there is one.
     """
     path = Path(path)
-    lines = [
-        (number, line)
-        for number, line in enumerate(read_lines(path), 1)
-        if line.strip() and not line.startswith("#")
-    ]
-    if len(lines) < 2:
-        raise DataError(f"{path}: there are no rows; give a line of column names and one row a series")
-    delimiter = max(_DELIMITERS, key=lines[0][1].count)
-    rows = list(csv.reader((line for _, line in lines), delimiter=delimiter, skipinitialspace=True))
-    header = [name.strip() for name in rows[0]]
+    header, rows = series_rows(path, read_lines(path))
     _require_columns(path, header)
     names, vectors = [], []
-    for (number, _), cells in zip(lines[1:], rows[1:], strict=True):
+    for number, cells in rows:
         place = f"{path}: line {number}"
-        if len(cells) != len(header):
-            raise DataError(f"{place}: {len(cells)} cells under {len(header)} column names")
-        row = {name: cell.strip() for name, cell in zip(header, cells, strict=True)}
+        row = dict(zip(header, cells, strict=True))
         if not row["series"]:
             raise DataError(f"{place}, column 'series': the cell is empty")
         names.append(row["series"])
