@@ -18,7 +18,7 @@ import numpy as np
 
 from pbrdf.data import make_dataset, write
 from pbrdf.data.paints import PAINTS, WAVELENGTH, load_paint
-from pbrdf.instruments.goniometer import Protocol
+from pbrdf.instruments.goniometer.protocols import Protocol
 
 NOISE = {"I": 0.01, "Q": 0.01, "U": 0.01, "V": 0.05}  # relative to I
 SEED = 20171102

@@ -23,7 +23,7 @@ from pbrdf.rendering.render import render_stokes
 from pbrdf.rendering.scenes import make_scene, subject
 from pbrdf.rendering.sky import Sky
 from pbrdf.rendering.variant import start_mitsuba
-from pbrdf.report.render_figure import stokes_figure
+from pbrdf.report.rendering.figure import stokes_figure
 from pbrdf.report.style import new_figure, save_figure, styled
 
 DOCS = Path(__file__).parents[1] / "docs"

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from pbrdf.instruments.calibration import standard_inputs
-from pbrdf.instruments.detector import Detector
-from pbrdf.instruments.instrument import Instrument
-from pbrdf.instruments.instrument_files import load_instrument, save_instrument
-from pbrdf.instruments.miscalibration import miscalibrated
-from pbrdf.instruments.polarimeter import division_of_focal_plane, lcvr, measured
-from pbrdf.instruments.retardance_sets import retardance_set
+from pbrdf.instruments.calibration.known_inputs import standard_inputs
+from pbrdf.instruments.polarimeter.detector import Detector
+from pbrdf.instruments.polarimeter.instrument import Instrument
+from pbrdf.instruments.polarimeter.instrument_files import load_instrument, save_instrument
+from pbrdf.instruments.polarimeter.polarimeter import division_of_focal_plane, lcvr, measured
+from pbrdf.instruments.polarimeter.retardance_sets import retardance_set
+from pbrdf.instruments.virtual.miscalibration import miscalibrated
 
 DETECTOR = Detector(bits=12, gain=2.5, read_noise=6.0, offset=50.0)
 NOMINAL = lcvr(retardance_set("tetrahedron"))

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 import pbrdf
-from pbrdf.data.pbsdf import read_table
+from pbrdf.data.formats.pbsdf import read_table
 
 
 @pytest.fixture

@@ -11,10 +11,10 @@ import pytest
 
 import pbrdf
 from pbrdf.data.paints import load_paint
-from pbrdf.instruments.angle_table import read_angles
-from pbrdf.instruments.frame_files import open_frames
-from pbrdf.instruments.instrument_files import load_instrument, save_instrument
-from pbrdf.instruments.presets import preset
+from pbrdf.instruments.frames.frame_files import open_frames
+from pbrdf.instruments.goniometer.angle_table import read_angles
+from pbrdf.instruments.polarimeter.instrument_files import load_instrument, save_instrument
+from pbrdf.instruments.polarimeter.presets import preset
 
 FAST = ("--smallest-bistatic", 30, "--largest-zenith", 70, "--budget", 24)
 

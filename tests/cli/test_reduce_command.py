@@ -10,11 +10,11 @@ import xarray as xr
 from PIL import Image
 
 import pbrdf
-from pbrdf.instruments.detector import Detector
-from pbrdf.instruments.instrument import Instrument
-from pbrdf.instruments.instrument_files import save_instrument
-from pbrdf.instruments.polarimeter import division_of_focal_plane, lcvr
-from pbrdf.instruments.retardance_sets import retardance_set
+from pbrdf.instruments.polarimeter.detector import Detector
+from pbrdf.instruments.polarimeter.instrument import Instrument
+from pbrdf.instruments.polarimeter.instrument_files import save_instrument
+from pbrdf.instruments.polarimeter.polarimeter import division_of_focal_plane, lcvr
+from pbrdf.instruments.polarimeter.retardance_sets import retardance_set
 from pbrdf.optics.elements import rotate_frame
 
 STATES = ("s1", "s2", "s3", "s4")

@@ -7,10 +7,10 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import pbrdf
-from pbrdf.data.merl import cell_centres, look_up, read_planes
-from pbrdf.data.pbsdf import read_table
-from pbrdf.data.rusinkiewicz import directions
+from pbrdf.data.formats.merl import cell_centres, look_up, read_planes
+from pbrdf.data.formats.pbsdf import read_table
 from pbrdf.errors import DataError, ModelError
+from pbrdf.optics.half_difference import directions
 from pbrdf.rendering.export import AIMS, UNSTATED_WAVELENGTH, grid_dataset, write_merl, write_pbsdf
 from pbrdf.rendering.tabulation import lobe_width, random_directions, refined_table
 

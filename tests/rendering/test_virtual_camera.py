@@ -9,11 +9,11 @@ from scene_helpers import pixel_axes, unit
 import pbrdf
 import pbrdf.rendering
 from pbrdf.errors import DataError
-from pbrdf.instruments.detector import Detector
-from pbrdf.instruments.instrument import Instrument
-from pbrdf.instruments.polarimeter import division_of_focal_plane, lcvr
-from pbrdf.instruments.reduction import reduce_frames
-from pbrdf.instruments.retardance_sets import retardance_set
+from pbrdf.instruments.polarimeter.detector import Detector
+from pbrdf.instruments.polarimeter.instrument import Instrument
+from pbrdf.instruments.polarimeter.polarimeter import division_of_focal_plane, lcvr
+from pbrdf.instruments.polarimeter.retardance_sets import retardance_set
+from pbrdf.instruments.reduction.stokes_image import reduce_frames
 from pbrdf.optics.elements import rotate_frame
 from pbrdf.rendering.picture import StokesPicture
 from pbrdf.rendering.render import render_stokes

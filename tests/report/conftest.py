@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import pbrdf
-from pbrdf.report.subject import Report
+from pbrdf.report.fit.subject import Report
 
 SETTINGS = {"starts": 8, "noise": None}
 

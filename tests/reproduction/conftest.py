@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pbrdf.reproduction.experiment import Options
+from pbrdf.reproduction.experiment.measurement import Options
 from pbrdf.reproduction.run import reproduce
 
 

@@ -126,12 +126,12 @@ def calibrate(
     if target.resolve() == Path(polarimeter).resolve():
         raise PbrdfError(f"--output {target}: that is the nominal instrument; choose another name")
     require_folder_of(target)
-    from pbrdf.instruments.frame_files import open_frames
-    from pbrdf.instruments.input_table import read_input_table
-    from pbrdf.instruments.instrument_calibration import calibrate_instrument
-    from pbrdf.instruments.instrument_files import save_instrument
-    from pbrdf.report.calibration_figure import calibration_figure
-    from pbrdf.report.calibration_summary import print_calibration, write_inputs
+    from pbrdf.instruments.calibration.input_table import read_input_table
+    from pbrdf.instruments.calibration.instrument_calibration import calibrate_instrument
+    from pbrdf.instruments.frames.frame_files import open_frames
+    from pbrdf.instruments.polarimeter.instrument_files import save_instrument
+    from pbrdf.report.instrument.calibration_figure import calibration_figure
+    from pbrdf.report.instrument.calibration_summary import print_calibration, write_inputs
     from pbrdf.report.style import save_figure
 
     instrument = open_instrument(polarimeter)

@@ -24,7 +24,7 @@ def check(
     The exit code is 2 if the file cannot be used as it stands.
     """
     from pbrdf.data import check as issues_of
-    from pbrdf.report.describe import describe
+    from pbrdf.report.dataset.describe import describe
 
     dataset = reading.open(file)
     for line in describe(dataset):

@@ -157,9 +157,9 @@ def fit(
 
     With your own: `pbrdf fit paint.csv --column I=f_r_per_sr --noise 3%,1% --fix n=1.5`
     """
-    from pbrdf.report.checks import run_checks
-    from pbrdf.report.files import FIGURE_FORMATS, require_writable, write_report
-    from pbrdf.report.subject import Report
+    from pbrdf.report.fit.checks import run_checks
+    from pbrdf.report.fit.folder import FIGURE_FORMATS, require_writable, write_report
+    from pbrdf.report.fit.subject import Report
 
     if figure_format not in FIGURE_FORMATS:
         raise PbrdfError(f"--figure-format {figure_format!r}: choose one of {', '.join(FIGURE_FORMATS)}")
@@ -221,7 +221,7 @@ def fit(
         if quiet:
             print(folder)
             continue
-        from pbrdf.report.summary import print_summary
+        from pbrdf.report.fit.summary import print_summary
 
         console = output_console()
         print_summary(report, console, verbose=verbose)

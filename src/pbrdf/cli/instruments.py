@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from pbrdf.errors import DataError
 
 if TYPE_CHECKING:
-    from pbrdf.instruments.instrument import Instrument
+    from pbrdf.instruments.polarimeter.instrument import Instrument
 
 __all__ = ["open_instrument"]
 
@@ -26,8 +26,8 @@ def open_instrument(source: str) -> Instrument:
     DataError
         If there is neither, or the file is not understood.
     """
-    from pbrdf.instruments.instrument_files import load_instrument
-    from pbrdf.instruments.presets import PRESETS, preset
+    from pbrdf.instruments.polarimeter.instrument_files import load_instrument
+    from pbrdf.instruments.polarimeter.presets import PRESETS, preset
 
     path = Path(source)
     if path.exists() or path.suffix:

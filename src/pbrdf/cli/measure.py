@@ -18,8 +18,8 @@ from pbrdf.cli.values import angles, number
 from pbrdf.errors import PbrdfError
 
 if TYPE_CHECKING:
-    from pbrdf.instruments.detector import Detector
-    from pbrdf.instruments.goniometer import Protocol
+    from pbrdf.instruments.goniometer.protocols import Protocol
+    from pbrdf.instruments.polarimeter.detector import Detector
 
 __all__ = ["measure"]
 
@@ -135,9 +135,9 @@ def measure(
     """
     import pbrdf
     from pbrdf.data.paints import PAINTS, WAVELENGTH
-    from pbrdf.instruments.measurement_folder import require_new, write_measurement
-    from pbrdf.instruments.source import AngleErrors, Source
-    from pbrdf.instruments.virtual_experiment import VirtualExperiment
+    from pbrdf.instruments.goniometer.source import AngleErrors, Source
+    from pbrdf.instruments.virtual.experiment import VirtualExperiment
+    from pbrdf.instruments.virtual.measurement_folder import require_new, write_measurement
 
     if wavelength is not None and not 0.0 < wavelength < math.inf:
         raise PbrdfError(f"--wavelength {wavelength:g}: give a wavelength above 0 in nm")
@@ -196,8 +196,8 @@ def _protocol(
     """The geometries that the options name."""
     import numpy as np
 
-    from pbrdf.instruments.angle_table import read_angles
-    from pbrdf.instruments.goniometer import Protocol
+    from pbrdf.instruments.goniometer.angle_table import read_angles
+    from pbrdf.instruments.goniometer.protocols import Protocol
 
     if table is not None:
         if positions is not None or sample_angles is not None:

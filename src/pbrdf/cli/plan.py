@@ -114,11 +114,11 @@ def plan(
     import numpy as np
 
     import pbrdf
-    from pbrdf.instruments.angle_table import write_angles
-    from pbrdf.inversion import candidates
-    from pbrdf.inversion.plan import plan as make_plan
-    from pbrdf.report.plan_figure import plan_figure
-    from pbrdf.report.plan_summary import print_plan
+    from pbrdf.instruments.goniometer.angle_table import write_angles
+    from pbrdf.planning import candidates
+    from pbrdf.planning.plan import plan as make_plan
+    from pbrdf.report.planning.figure import plan_figure
+    from pbrdf.report.planning.summary import print_plan
     from pbrdf.report.style import save_figure
 
     if noise is not None and instrument is not None:

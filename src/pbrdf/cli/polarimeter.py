@@ -48,7 +48,7 @@ def polarimeter(
     if search is None:
         if output is not None:
             raise PbrdfError("--output belongs to --search")
-        from pbrdf.report.polarimeter_summary import print_polarimeter
+        from pbrdf.report.instrument.polarimeter_summary import print_polarimeter
 
         assert source is not None
         print_polarimeter(open_instrument(source), output_console())
@@ -59,10 +59,10 @@ def polarimeter(
         require_folder_of(output)
     import numpy as np
 
-    from pbrdf.instruments.instrument import Instrument
-    from pbrdf.instruments.instrument_files import save_instrument
-    from pbrdf.instruments.retardance_search import search_retardances
-    from pbrdf.report.polarimeter_summary import merit_table, vector_table
+    from pbrdf.instruments.polarimeter.instrument import Instrument
+    from pbrdf.instruments.polarimeter.instrument_files import save_instrument
+    from pbrdf.instruments.polarimeter.retardance_search import search_retardances
+    from pbrdf.report.instrument.polarimeter_summary import merit_table, vector_table
 
     ends = [number(part, "--limits") for part in limits.split(":")]
     if len(ends) != 2 or ends[0] >= ends[1]:

@@ -15,7 +15,7 @@ from pbrdf.cli.values import number, pairs
 from pbrdf.errors import PbrdfError
 
 if TYPE_CHECKING:
-    from pbrdf.instruments.regions import Region
+    from pbrdf.instruments.reduction.regions import Region
 
 __all__ = ["open_regions", "reduce"]
 
@@ -106,14 +106,14 @@ def reduce(
         raise PbrdfError(f"--maps {maps!r}: choose nc, zarr or none")
     if datasets not in ("csv", "nc"):
         raise PbrdfError(f"--datasets {datasets!r}: choose csv or nc")
-    from pbrdf.instruments.angle_table import read_angles
-    from pbrdf.instruments.frame_files import open_frames
-    from pbrdf.instruments.frames import ChosenSeries, Frames
-    from pbrdf.report.files import require_writable
-    from pbrdf.report.reduction_files import Wanted, write_reduction
+    from pbrdf.instruments.frames.frame_files import open_frames
+    from pbrdf.instruments.frames.frames import ChosenSeries, Frames
+    from pbrdf.instruments.goniometer.angle_table import read_angles
+    from pbrdf.report.fit.folder import require_writable
+    from pbrdf.report.reduction.folder import Wanted, write_reduction
 
     if maps == "zarr":
-        from pbrdf.data.zarr_folder import require_zarr
+        from pbrdf.data.formats.zarr_folder import require_zarr
 
         require_zarr(Path("stokes.zarr"))
     instrument = open_instrument(polarimeter)
@@ -154,7 +154,7 @@ def reduce(
     if quiet:
         print(folder)
         return
-    from pbrdf.report.reduction_summary import print_averages
+    from pbrdf.report.reduction.summary import print_averages
 
     console = output_console()
     console.print(
@@ -169,7 +169,7 @@ def reduce(
 
 def open_regions(file: Path | None, texts: list[str]) -> dict[str, Region]:
     """Regions of --regions and --roi by name; raises PbrdfError if one is not understood or a name comes twice."""
-    from pbrdf.instruments.region_files import read_regions, region_from_text
+    from pbrdf.instruments.reduction.region_files import read_regions, region_from_text
 
     found = {} if file is None else read_regions(file)
     for name, text in pairs(texts, "--roi", "paint=100:200,150:260").items():

@@ -96,7 +96,7 @@ def render(
     Two paints, seen through a polariser: `pbrdf render white pearl-white --scene plate --polarizer 90`
     """
     from pbrdf.cli.sources import open_model
-    from pbrdf.report.files import require_writable
+    from pbrdf.report.fit.folder import require_writable
 
     sources = models or []
     own = not scene.endswith(".xml")
@@ -217,7 +217,7 @@ def _stage(
 def _write(picture: StokesPicture, target: Path, title: str, polarizers: list[float]) -> list[Path]:
     """Write the picture's files; returns them."""
     from pbrdf.rendering.picture import polarizer_name, write_exr
-    from pbrdf.report.render_figure import channel_figure, polarizer_figure, stokes_figure
+    from pbrdf.report.rendering.figure import channel_figure, polarizer_figure, stokes_figure
     from pbrdf.report.style import save_figure
 
     if target.suffix.lower() == ".exr":

@@ -74,8 +74,8 @@ def reproduce(
     position 3. Writes a folder with a page (index.html), figures, tables, data sets and fitted models. The paper
     published no raw data: everything is simulated, and says so.
     """
-    from pbrdf.report.files import require_writable
-    from pbrdf.reproduction.experiment import Options
+    from pbrdf.report.fit.folder import require_writable
+    from pbrdf.reproduction.experiment.measurement import Options
     from pbrdf.reproduction.run import reproduce as run
     from pbrdf.reproduction.run import write_reproduction
 
@@ -98,7 +98,7 @@ def reproduce(
     if quiet:
         print(written[0])
         return
-    from pbrdf.reproduction.summary import print_summary
+    from pbrdf.reproduction.page.summary import print_summary
 
     print_summary(reproduction, output_console())
     print(f"\nWritten to {output}: open {written[0]}")

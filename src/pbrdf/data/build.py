@@ -15,7 +15,6 @@ from pbrdf.data.schema import (
     DIMENSION,
     NATURAL_LIGHT,
     QUANTITIES,
-    STOKES,
     STOKES_AXES,
     VARIABLES,
     spells_integer,
@@ -25,6 +24,7 @@ from pbrdf.data.schema import (
 )
 from pbrdf.data.validate import validate
 from pbrdf.errors import DataError
+from pbrdf.optics.stokes import STOKES
 
 __all__ = ["assemble", "group_labels", "make_dataset"]
 

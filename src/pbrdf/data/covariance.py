@@ -12,8 +12,9 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
-from pbrdf.data.schema import COVARIANCE, STOKES, std_name
+from pbrdf.data.schema import COVARIANCE, std_name
 from pbrdf.errors import DataError
+from pbrdf.optics.stokes import STOKES
 
 __all__ = ["complete_covariance", "correlations", "covariance_problems", "derived_variance", "square"]
 

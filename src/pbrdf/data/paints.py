@@ -10,7 +10,7 @@ from __future__ import annotations
 from importlib import resources
 from typing import TYPE_CHECKING
 
-from pbrdf.data.files import read
+from pbrdf.data.readers import read
 from pbrdf.errors import DataError
 from pbrdf.models import DoubleGauss
 

@@ -68,7 +68,6 @@ __all__ = [
     "FORMS",
     "NATURAL_LIGHT",
     "QUANTITIES",
-    "STOKES",
     "STOKES_AXES",
     "TEXT_ATTRIBUTES",
     "UNITS",
@@ -80,7 +79,6 @@ __all__ = [
 ]
 
 DIMENSION = "geometry"
-STOKES = ("I", "Q", "U", "V")
 NATURAL_LIGHT = (1.0, 0.0, 0.0, 0.0)
 
 QUANTITIES = ("brdf", "reflectance_factor", "radiance", "dn")

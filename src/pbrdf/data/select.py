@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from pbrdf.data.conventions import reflectance_factor_to_brdf, remove_cosine_weight
 from pbrdf.data.covariance import derived_variance
-from pbrdf.data.schema import COVARIANCE, STOKES, VARIABLES, std_name, variable_units
+from pbrdf.data.schema import COVARIANCE, VARIABLES, std_name, variable_units
 from pbrdf.errors import DataError
+from pbrdf.optics.stokes import STOKES
 
 __all__ = ["match_wavelengths", "measured_channels", "to_brdf_scale"]
 

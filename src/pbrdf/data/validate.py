@@ -27,7 +27,6 @@ from pbrdf.data.schema import (
     FILE_KEYS,
     FORMS,
     QUANTITIES,
-    STOKES,
     STOKES_AXES,
     TEXT_ATTRIBUTES,
     VARIABLES,
@@ -36,6 +35,7 @@ from pbrdf.data.schema import (
     variable_dims,
 )
 from pbrdf.errors import DataError
+from pbrdf.optics.stokes import STOKES
 
 __all__ = ["Issue", "check", "validate"]
 

@@ -10,10 +10,11 @@ import numpy as np
 
 from pbrdf.data.conventions import qu_from_dolp_aolp
 from pbrdf.data.covariance import correlations
-from pbrdf.data.schema import COVARIANCE, STOKES
+from pbrdf.data.schema import COVARIANCE
 from pbrdf.data.select import measured_channels, to_brdf_scale
 from pbrdf.errors import FitError
 from pbrdf.inversion.noise import Noise, NoiseModel
+from pbrdf.optics.stokes import STOKES
 
 if TYPE_CHECKING:
     import xarray as xr

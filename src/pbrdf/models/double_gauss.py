@@ -18,10 +18,10 @@ from pbrdf.models.base import Matrix, Model
 from pbrdf.models.parameters import Parameter
 from pbrdf.optics.diffuse import mrpv
 from pbrdf.optics.facets import projected_area_density
-from pbrdf.optics.frames import facet_rotations
 from pbrdf.optics.fresnel import mueller_reflection
 from pbrdf.optics.geometry import Geometry
 from pbrdf.optics.quadrature import ACCURACIES
+from pbrdf.optics.reference_planes import facet_rotations
 from pbrdf.optics.shadowing import SHADOWING
 from pbrdf.optics.transmission import (
     NORMALIZATIONS,

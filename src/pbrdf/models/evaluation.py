@@ -17,6 +17,7 @@ from pbrdf.backend import Backend, get_backend
 from pbrdf.errors import ModelError
 from pbrdf.optics.geometry import geometry_from_angles
 from pbrdf.optics.quadrature import CLEAR_WEDGE, SIGMA_25
+from pbrdf.optics.stokes import STOKES
 
 if TYPE_CHECKING:
     from pbrdf.models.base import Model
@@ -25,7 +26,6 @@ __all__ = ["CHUNK", "kernel_from_angles", "mueller", "stokes"]
 
 #: Directions evaluated at a time: bounds the memory (16 float64 each) and keeps all threads busy.
 CHUNK = 1 << 20
-STOKES = ["I", "Q", "U", "V"]
 #: Cosines up to this count as at or below the horizon, where the BRDF is 0.
 _HORIZON = 1e-12
 
@@ -338,7 +338,7 @@ def _evaluate_xarray(
     result = xr.DataArray(
         data,
         dims=[*template.dims, *extra],
-        coords={**template.coords, **dict.fromkeys(extra, STOKES)},
+        coords={**template.coords, **{axis: list(STOKES) for axis in extra}},
         name="mueller" if len(shape) == 2 else "stokes",
     )
     result.attrs.update(

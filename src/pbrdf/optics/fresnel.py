@@ -7,7 +7,7 @@ r_s = (c − q)/(c + q), r_p = (εc − q)/(εc + q). The Stokes frame is p-posi
 For light leaving the coating the transmittances are the same as for light entering it (T = 1 − |r|²).
 From q² = ε − sin²β follows r_p = r_s (sin²β − cq)/(sin²β + cq), so the difference of the transmittances
 carries a factor sin²β in closed form; it is returned without that factor, which takes the singularity
-out of the rotation that follows (:func:`pbrdf.optics.frames.tilt_rotation`).
+out of the rotation that follows (:func:`pbrdf.optics.reference_planes.tilt_rotation`).
 """
 
 from __future__ import annotations

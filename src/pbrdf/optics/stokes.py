@@ -9,7 +9,10 @@ from __future__ import annotations
 
 from typing import Any
 
-__all__ = ["aolp", "docp", "dolp", "dop"]
+__all__ = ["STOKES", "aolp", "docp", "dolp", "dop"]
+
+#: The Stokes parameters in their order.
+STOKES = ("I", "Q", "U", "V")
 
 
 def dolp(stokes: Any) -> Any:

@@ -17,10 +17,10 @@ from typing import Any
 import drjit as dr
 
 from pbrdf.optics.diffuse import minnaert_shape
-from pbrdf.optics.frames import tilt_rotation
 from pbrdf.optics.fresnel import transmittances
 from pbrdf.optics.geometry import Geometry, dot
 from pbrdf.optics.quadrature import facet_average, table
+from pbrdf.optics.reference_planes import tilt_rotation
 
 __all__ = [
     "NORMALIZATIONS",

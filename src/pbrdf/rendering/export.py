@@ -14,11 +14,11 @@ from numpy.typing import ArrayLike, NDArray
 
 import pbrdf
 from pbrdf.data.build import make_dataset
-from pbrdf.data.merl import COLOURS, SHAPE, cell_centres, write_planes
-from pbrdf.data.pbsdf import MOST_WAVELENGTHS, SIMULATED, PolarizedTable, write_table
-from pbrdf.data.rusinkiewicz import directions
+from pbrdf.data.formats.merl import COLOURS, SHAPE, cell_centres, write_planes
+from pbrdf.data.formats.pbsdf import MOST_WAVELENGTHS, SIMULATED, PolarizedTable, write_table
 from pbrdf.errors import DataError, ModelError
 from pbrdf.models import Model
+from pbrdf.optics.half_difference import directions
 from pbrdf.rendering.tabulation import TableError, lobe_width, refined_table
 
 if TYPE_CHECKING:

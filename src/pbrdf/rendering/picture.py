@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from pbrdf.data.storage import atomic_target
+from pbrdf.data.formats.storage import atomic_target
 from pbrdf.errors import DataError
 from pbrdf.optics.elements import diattenuator
 from pbrdf.optics.stokes import aolp, dolp

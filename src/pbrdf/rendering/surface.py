@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 
 import drjit as dr
 
-from pbrdf.rendering.frames import LightPath, light_path, to_mitsuba
 from pbrdf.rendering.properties import Paint
+from pbrdf.rendering.reference_planes import LightPath, light_path, to_mitsuba
 from pbrdf.rendering.sampling import facet_share, pdf, sample_direction
 
 __all__ = ["Reflection", "Surface"]

@@ -15,9 +15,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrdf.data.pbsdf import HORIZON, PolarizedTable, mueller_to_pbsdf
-from pbrdf.data.rusinkiewicz import directions, half_difference
+from pbrdf.data.formats.pbsdf import HORIZON, PolarizedTable, mueller_to_pbsdf
 from pbrdf.models import Model
+from pbrdf.optics.half_difference import directions, half_difference
 
 __all__ = ["LARGEST_TABLE", "ZENITH_LIMIT", "TableError", "lobe_width", "random_directions", "refined_table"]
 

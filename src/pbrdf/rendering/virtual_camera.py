@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pbrdf.errors import DataError
-from pbrdf.instruments.frames import ArrayFrames, Frames, MosaicFrames
-from pbrdf.instruments.instrument import Instrument
-from pbrdf.instruments.rays import angles_of
-from pbrdf.instruments.reduction import StokesImage
-from pbrdf.instruments.series import to_surface_frame
+from pbrdf.instruments.frames.frames import ArrayFrames, Frames, MosaicFrames
+from pbrdf.instruments.goniometer.rays import angles_of
+from pbrdf.instruments.polarimeter.instrument import Instrument
+from pbrdf.instruments.reduction.series import to_surface_frame
+from pbrdf.instruments.reduction.stokes_image import StokesImage
 from pbrdf.rendering.picture import StokesPicture
 
 if TYPE_CHECKING:
@@ -181,7 +181,7 @@ def pixel_dataset(
     Parameters
     ----------
     image
-        Reduced frames, see :func:`pbrdf.instruments.reduction.reduce_frames`; in the axes of the picture.
+        Reduced frames, see :func:`pbrdf.instruments.reduction.stokes_image.reduce_frames`; in the axes of the picture.
     geometry
         Of the same pixels.
     exposure
@@ -209,7 +209,7 @@ def pixel_dataset(
         If the sizes differ or no pixel is left.
     """
     from pbrdf.data.build import make_dataset
-    from pbrdf.data.schema import STOKES
+    from pbrdf.optics.stokes import STOKES
 
     if image.flags.shape != geometry.theta_i.shape:
         raise DataError(f"the frames have {image.flags.shape} pixels, the geometry {geometry.theta_i.shape}")

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pbrdf.data.storage import atomic_target
+from pbrdf.data.formats.storage import atomic_target
 from pbrdf.errors import DataError
 
 if TYPE_CHECKING:

@@ -7,13 +7,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from pbrdf.data.files import write
 from pbrdf.data.paints import load_paint
-from pbrdf.reproduction.catalogue import Evaluated, evaluate
-from pbrdf.reproduction.expected import Number, expected_numbers
-from pbrdf.reproduction.experiment import Options, measured_samples
+from pbrdf.data.readers import write
+from pbrdf.reproduction.experiment.measurement import Options, measured_samples
+from pbrdf.reproduction.experiment.sample import Sample, invert
 from pbrdf.reproduction.paper import SIMULATED
-from pbrdf.reproduction.sample import Sample, invert
+from pbrdf.reproduction.statements.catalogue import Evaluated, evaluate
+from pbrdf.reproduction.statements.expected import Number, expected_numbers
 
 __all__ = ["Reproduction", "reproduce", "write_reproduction"]
 
@@ -88,11 +88,11 @@ def write_reproduction(
     DataError
         If the folder cannot be written.
     """
-    from pbrdf.report.files import complete_folder
+    from pbrdf.report.fit.folder import complete_folder
     from pbrdf.report.style import save_figure
-    from pbrdf.reproduction.page import page_text
-    from pbrdf.reproduction.pictures import pictures
-    from pbrdf.reproduction.tables import csv_text, tables
+    from pbrdf.reproduction.figures.all import pictures
+    from pbrdf.reproduction.page.page import page_text
+    from pbrdf.reproduction.page.tables import csv_text, tables
 
     settings = reproduction.options.in_words()
     rows = tables(reproduction.samples, reproduction.statements, reproduction.numbers)

@@ -1,0 +1,65 @@
+"""netCDF-4 files by h5netcdf: the data set of :mod:`pbrdf.data.schema` as :mod:`pbrdf.data.formats.stored` says."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Final
+
+import xarray as xr
+
+from pbrdf.data.formats.storage import atomic_target
+from pbrdf.data.formats.stored import from_stored, to_stored
+from pbrdf.errors import DataError
+
+__all__ = ["read_netcdf", "write_netcdf"]
+
+_ENGINE: Final = "h5netcdf"
+
+
+def read_netcdf(path: str | Path) -> xr.Dataset:
+    """Read a data set from a netCDF file; :func:`pbrdf.data.formats.stored.from_stored` says how it is understood.
+
+    Parameters
+    ----------
+    path
+        The file.
+
+    Returns
+    -------
+    xarray.Dataset
+        A valid data set, loaded into memory.
+
+    Raises
+    ------
+    DataError
+        If it is not a netCDF file or does not follow the schema.
+    """
+    path = Path(path)
+    try:
+        with xr.open_dataset(path, engine=_ENGINE, decode_times=False) as file:
+            stored = file.load()
+    except (OSError, ValueError) as error:
+        raise DataError(f"{path}: cannot be read as netCDF: {error}") from error
+    return from_stored(stored, path)
+
+
+def write_netcdf(ds: xr.Dataset, path: str | Path) -> None:
+    """Write a data set as a netCDF-4 file that :func:`read_netcdf` reads back bit for bit.
+
+    The file appears under its name only when it is complete.
+
+    Parameters
+    ----------
+    ds
+        A valid data set.
+    path
+        The file; replaced if it exists.
+
+    Raises
+    ------
+    DataError
+        If `ds` does not follow the schema or the file cannot be written.
+    """
+    stored = to_stored(ds)
+    with atomic_target(Path(path)) as target:
+        stored.to_netcdf(target, engine=_ENGINE, format="NETCDF4")

@@ -1,0 +1,131 @@
+"""Mueller-matrix tables in the layout of NIST's SCATMECH data.
+
+T. A. Germer published the BRDF of sintered PTFE so (Applied Optics 56, 9333 (2017)). Columns: ``lambda`` in
+µm; ``thetai``, ``phi`` (or ``phii``), ``thetar``, ``phir`` in degrees; ``f_r11`` in 1/sr; and
+``f_rij/f_r11`` (or ``mij``) for the other fifteen elements, counted from 1.
+
+``thetai`` is negative with ``phi`` = 0: the source stands at azimuth 180° and forward is ``phir`` = 0. The
+polarisation is given in SCATMECH's ``xyxy`` frame of the sample, with Q = |E_y|² − |E_x|², where y is s and x
+is p in the plane of incidence. The reader turns the outgoing frame to s and p and then swaps Q to I_p − I_s.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from pbrdf.data.build import assemble
+from pbrdf.data.conventions import mueller_from_scatmech, mueller_xyxy_to_sp
+from pbrdf.data.formats.storage import read_lines
+from pbrdf.data.select import match_wavelengths
+from pbrdf.data.validate import validate
+from pbrdf.errors import DataError
+
+__all__ = ["has_scatmech_columns", "read_scatmech"]
+
+_INDICES = [(i, j) for i in range(1, 5) for j in range(1, 5)]
+_COLUMNS = {
+    "lambda": ("lambda",),
+    "thetai": ("thetai",),
+    "phi": ("phi", "phii"),
+    "thetar": ("thetar",),
+    "phir": ("phir",),
+    **{f"m{i}{j}": (f"f_r{i}{j}/f_r11", f"m{i}{j}") for i, j in _INDICES[1:]},
+    "f_r11": ("f_r11", "fr11"),
+}
+
+
+def has_scatmech_columns(names: Sequence[str]) -> bool:
+    """Whether these are the column names of this layout."""
+    return {name.lower() for name in names} & {"f_r11", "fr11"} != set()
+
+
+def read_scatmech(path: str | Path, *, wavelength: float | Sequence[float] | None = None) -> xr.Dataset:
+    """Read a Mueller-matrix table in SCATMECH's layout.
+
+    Parameters
+    ----------
+    path
+        The file.
+    wavelength
+        Wavelength or wavelengths to take, in nm; all if None.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``mueller`` as a BRDF in 1/sr, project's conventions; ``group`` is θ_i in whole degrees.
+
+    Raises
+    ------
+    DataError
+        Names the file, the line and the column.
+    """
+    path = Path(path)
+    cells = csv.reader(read_lines(path), skipinitialspace=True)
+    names = [name.strip().lower() for name in next(cells)]
+    positions = {}
+    for key, spellings in _COLUMNS.items():
+        found = [names.index(spelling) for spelling in spellings if spelling in names]
+        if not found:
+            raise DataError(f"{path}: line 1: there is no column {' or '.join(map(repr, spellings))}")
+        positions[key] = found[0]
+
+    rows, lines = [], []
+    for line, row in enumerate(cells, start=2):
+        if not row:
+            continue
+        if len(row) != len(names):
+            raise DataError(f"{path}: line {line}: {len(row)} cells under {len(names)} column names")
+        rows.append([_number(path, line, names[index], row[index]) for index in positions.values()])
+        lines.append(line)
+    if not rows:
+        raise DataError(f"{path}: there are no rows under the column names")
+    columns = dict(zip(positions, np.array(rows).T, strict=True))
+
+    micrometres, which = np.unique(columns["lambda"], return_inverse=True)
+    # Round: 0.351 µm times 1000 is not 351 in binary.
+    available = np.round(micrometres * 1000, 6)
+    keep = np.isin(which, match_wavelengths(available, wavelength, str(path)))
+    columns = {key: values[keep] for key, values in columns.items()}
+    kept_lines = np.array(lines)[keep].tolist()
+    _require_known_source(path, columns["thetai"], columns["phi"], kept_lines)
+
+    phi = np.deg2rad(columns["phir"])
+    elements = [np.ones_like(phi), *(columns[f"m{i}{j}"] for i, j in _INDICES[1:])]
+    normalized = np.stack(elements, axis=-1).reshape(-1, 4, 4)
+    mueller = mueller_from_scatmech(mueller_xyxy_to_sp(normalized, phi))
+    ds = assemble(
+        {
+            "theta_i": np.deg2rad(-columns["thetai"]),
+            "theta_r": np.deg2rad(columns["thetar"]),
+            "phi": phi,
+            "wavelength": available[which[keep]],
+            "group": np.round(-columns["thetai"]).astype(np.int64),
+        },
+        {"mueller": columns["f_r11"][:, np.newaxis, np.newaxis] * mueller},
+        {},
+        {"quantity": "brdf", "illumination": [1.0, 0.0, 0.0, 0.0], "simulated": 0, "source": path.name},
+    )
+    validate(ds, origin=str(path), lines=kept_lines)
+    return ds
+
+
+def _number(path: Path, line: int, name: str, cell: str) -> float:
+    try:
+        return float(cell)
+    except ValueError:
+        raise DataError(f"{path}: line {line}, column {name!r}: {cell!r} is not a number") from None
+
+
+def _require_known_source(path: Path, theta_i: np.ndarray, phi_i: np.ndarray, lines: list[int]) -> None:
+    odd = np.flatnonzero((theta_i > 0) | (phi_i != 0))
+    if odd.size:
+        row = odd[0]
+        raise DataError(
+            f"{path}: line {lines[row]}: thetai = {theta_i[row]:g}, phi = {phi_i[row]:g}; only thetai <= 0 "
+            "with phi = 0 is understood, where forward is phir = 0 and the polarisation axes are certain"
+        )

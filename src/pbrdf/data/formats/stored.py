@@ -1,0 +1,133 @@
+"""Data sets as netCDF and Zarr hold them.
+
+Angles are stored in degrees with ``units = "degree"``, or in radians with ``units = "rad"`` where a value has no
+exact counterpart in degrees, so that reading gives back the same bits. Attributes that netCDF cannot hold (lists
+of text, of one element or of mixed types) are stored as JSON text.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from pbrdf.data.build import group_labels
+from pbrdf.data.formats.storage import exact_degrees, plain_attributes
+from pbrdf.data.schema import (
+    ANGLES,
+    COORDINATES,
+    COVARIANCE,
+    STOKES_AXES,
+    VARIABLES,
+    std_name,
+    variable_units,
+)
+from pbrdf.data.validate import validate
+from pbrdf.errors import DataError
+
+__all__ = ["from_stored", "to_stored"]
+
+_ANGLE_UNITS = {"degree": True, "degrees": True, "deg": True, "rad": False, "radian": False, "radians": False}
+_NANOMETRES = {
+    "nm": 1.0,
+    "nanometer": 1.0,
+    "nanometre": 1.0,
+    "um": 1e3,
+    "µm": 1e3,
+    "micrometer": 1e3,
+    "micrometre": 1e3,
+}
+_JSON = "json:"
+
+
+def from_stored(stored: xr.Dataset, path: Path) -> xr.Dataset:
+    """Turn what a file holds into a valid data set.
+
+    Angles and wavelengths are converted by their attribute ``units``; without one they are taken in radians
+    and nm. Variables that the schema does not know are left out and listed in the attribute
+    ``ignored_variables``.
+
+    Parameters
+    ----------
+    stored
+        Content of the file, loaded into memory.
+    path
+        The file, for messages.
+
+    Raises
+    ------
+    DataError
+        If a unit is not understood or the content does not follow the schema.
+    """
+    known = {*COORDINATES, *VARIABLES, *map(std_name, VARIABLES), COVARIANCE, *STOKES_AXES}
+    attrs = {name: _attribute_from_stored(value) for name, value in plain_attributes(stored.attrs).items()}
+    ignored = sorted(str(name) for name in stored.variables if name not in known)
+    if ignored:
+        attrs["ignored_variables"] = ignored
+    coords: dict[str, Any] = {}
+    data: dict[str, Any] = {}
+    for name in sorted(known & set(map(str, stored.variables))):
+        array = stored[name]
+        target = coords if name in stored.coords or name in COORDINATES else data
+        if name == "group":
+            target[name] = (array.dims, group_labels(array.values))
+        elif name in STOKES_AXES:
+            target[name] = (array.dims, array.values.astype(np.str_))
+        else:
+            units = {"units": variable_units(name, attrs.get("quantity", ""))}
+            target[name] = (array.dims, _from_file_units(path, name, array), units)
+    ds = xr.Dataset(data, coords, attrs)
+    validate(ds, origin=str(path))
+    return ds
+
+
+def _from_file_units(path: Path, name: str, array: xr.DataArray) -> NDArray[Any]:
+    values = array.values
+    if name not in ANGLES and name != "wavelength":
+        return values
+    table: Mapping[str, float] = _ANGLE_UNITS if name in ANGLES else _NANOMETRES
+    units = array.attrs.get("units", "rad" if name in ANGLES else "nm")
+    if units not in table:
+        raise DataError(f"{path}: the units {units!r} of {name} are not understood; use {', '.join(table)}")
+    if name in ANGLES:
+        return np.deg2rad(values) if table[units] else values
+    return values * table[units]
+
+
+def to_stored(ds: xr.Dataset) -> xr.Dataset:
+    """Turn a data set into what :func:`from_stored` turns back bit for bit.
+
+    Raises
+    ------
+    DataError
+        If `ds` does not follow the schema.
+    """
+    validate(ds)
+    stored = ds.copy()
+    for name in ANGLES:
+        if name in ds.variables:
+            degrees = exact_degrees(ds[name].values)
+            if degrees is not None:
+                stored[name] = (ds[name].dims, degrees, {**ds[name].attrs, "units": "degree"})
+    stored.attrs = {name: _attribute_to_stored(value) for name, value in plain_attributes(ds.attrs).items()}
+    return stored
+
+
+def _attribute_to_stored(value: Any) -> Any:
+    """What netCDF can hold: numbers, plain text, and lists of two or more numbers of one type."""
+    if isinstance(value, str) and (value.startswith(_JSON) or "\0" in value):
+        return _JSON + json.dumps(value)
+    if isinstance(value, list) and (len(value) < 2 or {*map(type, value)} not in ({int}, {float})):
+        return _JSON + json.dumps(value, ensure_ascii=False)
+    return value
+
+
+def _attribute_from_stored(value: Any) -> Any:
+    return (
+        json.loads(value.removeprefix(_JSON)) if isinstance(value, str) and value.startswith(_JSON) else value
+    )

@@ -1,0 +1,87 @@
+"""Zarr folders: the data set of :mod:`pbrdf.data.schema` as :mod:`pbrdf.data.formats.stored` says.
+
+The second version of the format is written, as the third has no agreed type for text; both are read.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+
+import xarray as xr
+
+from pbrdf.data.formats.storage import atomic_folder
+from pbrdf.data.formats.stored import from_stored, to_stored
+from pbrdf.errors import DataError
+
+__all__ = ["read_zarr", "require_zarr", "write_zarr"]
+
+#: A folder with one of these in it is a group of Zarr arrays.
+_MARKS = (".zgroup", ".zmetadata", "zarr.json")
+
+
+def read_zarr(path: str | Path) -> xr.Dataset:
+    """Read a data set from a Zarr folder; :func:`pbrdf.data.formats.stored.from_stored` says how it is understood.
+
+    Parameters
+    ----------
+    path
+        The folder.
+
+    Returns
+    -------
+    xarray.Dataset
+        A valid data set, loaded into memory.
+
+    Raises
+    ------
+    DataError
+        If zarr is not installed, the folder is not one of Zarr, or it does not follow the schema.
+    """
+    path = Path(path)
+    require_zarr(path)
+    if not _is_group(path):
+        raise DataError(f"{path}: this is not a Zarr folder: it holds no {' or '.join(_MARKS)}")
+    try:
+        with xr.open_dataset(path, engine="zarr", consolidated=False, decode_times=False) as file:
+            stored = file.load()
+    except (OSError, ValueError, KeyError) as error:
+        raise DataError(f"{path}: cannot be read as Zarr: {error}") from error
+    return from_stored(stored, path)
+
+
+def write_zarr(ds: xr.Dataset, path: str | Path) -> None:
+    """Write a data set as a Zarr folder that :func:`read_zarr` reads back bit for bit.
+
+    The folder appears under its name only when it is complete.
+
+    Parameters
+    ----------
+    ds
+        A valid data set.
+    path
+        The folder; replaced if it is one of Zarr.
+
+    Raises
+    ------
+    DataError
+        If zarr is not installed, `ds` does not follow the schema, something else has that name, or the folder
+        cannot be written.
+    """
+    path = Path(path)
+    require_zarr(path)
+    if path.exists() and not _is_group(path):
+        raise DataError(f"{path}: there is something else of that name, which is left alone; choose another")
+    stored = to_stored(ds)
+    with atomic_folder(path) as target:
+        stored.to_zarr(target, mode="w", zarr_format=2, consolidated=True)
+
+
+def _is_group(path: Path) -> bool:
+    return any((path / mark).is_file() for mark in _MARKS)
+
+
+def require_zarr(path: Path) -> None:
+    """Check that zarr is installed; raises DataError, which names the file and says how to install it."""
+    if importlib.util.find_spec("zarr") is None:
+        raise DataError(f"{path}: .zarr needs the package zarr: pip install zarr, or use .nc instead")

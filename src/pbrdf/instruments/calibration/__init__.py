@@ -1,0 +1,1 @@
+"""Calibration of a polarimeter from frames of known light."""

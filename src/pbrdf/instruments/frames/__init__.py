@@ -1,0 +1,1 @@
+"""Raw frames and the files that hold them."""

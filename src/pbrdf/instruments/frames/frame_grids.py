@@ -1,0 +1,153 @@
+"""Frames in netCDF files and Zarr folders: a variable over series, state, y and x."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pbrdf.data.formats.zarr_folder import require_zarr
+from pbrdf.errors import DataError
+from pbrdf.instruments.frames.frames import named, require_raw
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["GRID_SUFFIXES", "GriddedFrames", "open_grid"]
+
+#: Extensions of such files.
+GRID_SUFFIXES = (".nc", ".nc4", ".zarr")
+#: Names of the dimensions of frames in netCDF and Zarr.
+_DIMENSIONS = {
+    "series": ("series", "geometry", "exposure", "time"),
+    "state": ("state", "states", "analyzer"),
+    "y": ("y", "row", "rows"),
+    "x": ("x", "column", "columns"),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class GriddedFrames:
+    """Frames in a variable of a netCDF file or a Zarr folder, which is read where it is asked for.
+
+    Attributes
+    ----------
+    names
+        Of the series.
+    variable
+        With the dimensions y and x, and series and state where there is more than one.
+    path
+        The file or folder, for messages.
+    """
+
+    names: tuple[str, ...]
+    variable: xr.DataArray
+    path: Path
+
+    @property
+    def states(self) -> int:
+        return self.variable.sizes.get("state", 1)
+
+    @property
+    def rows(self) -> int:
+        return self.variable.sizes["y"]
+
+    @property
+    def columns(self) -> int:
+        return self.variable.sizes["x"]
+
+    def read(self, series: int, first_row: int, last_row: int) -> np.ndarray:
+        part = self.variable.isel(y=slice(first_row, last_row))
+        if "series" in part.dims:
+            part = part.isel(series=series)
+        order = ("state", "y", "x") if "state" in part.dims else ("y", "x")
+        try:
+            values = part.transpose(*order).values
+        except (OSError, RuntimeError, ValueError) as error:
+            raise DataError(f"{self.path}: cannot be read: {error}") from error
+        return values if values.ndim == 3 else values[np.newaxis]
+
+
+def open_grid(path: Path, states: Sequence[str]) -> GriddedFrames:
+    """Find the frames in a netCDF file or a Zarr folder.
+
+    Parameters
+    ----------
+    path
+        The file or folder.
+    states
+        Names of the states of the polarimeter.
+
+    Raises
+    ------
+    DataError
+        If zarr is missing, the file cannot be read, or it does not hold such frames.
+    """
+    import xarray as xr
+
+    options: dict[str, Any] = {"engine": "h5netcdf"}
+    if path.suffix.lower() == ".zarr":
+        require_zarr(path)
+        options = {"engine": "zarr", "consolidated": False}
+    try:
+        file = xr.open_dataset(path, mask_and_scale=False, decode_times=False, cache=False, **options)
+    except (OSError, ValueError, KeyError) as error:
+        raise DataError(f"{path}: cannot be read: {error}") from error
+    frames = _variable(path, file)
+    require_raw(frames.dtype, f"{path}: the variable {frames.name}")
+    names = _labels(frames, "series") if "series" in frames.dims else (path.stem,)
+    if len(set(names)) != len(names):
+        raise DataError(f"{path}: two series of {frames.name} have the same name")
+    return GriddedFrames(names, _in_order(path, frames, states), path)
+
+
+def _variable(path: Path, file: xr.Dataset) -> xr.DataArray:
+    """The variable with the frames, its dimensions called series, state, y and x."""
+    meanings = {dim: ours for ours, theirs in _DIMENSIONS.items() for dim in theirs}
+    fitting = [
+        name
+        for name, array in file.data_vars.items()
+        if {meanings.get(str(d)) for d in array.dims} >= {"y", "x"} and array.dtype.kind in "iuf"
+    ]
+    if "frames" in fitting:
+        fitting = ["frames"]
+    if len(fitting) != 1:
+        raise DataError(
+            f"{path}: {'no' if not fitting else 'more than one'} variable holds pictures; give one called frames "
+            "with the dimensions series, state, y, x"
+        )
+    array = file[fitting[0]]
+    strange = [str(d) for d in array.dims if str(d) not in meanings]
+    ours = [meanings.get(str(d)) for d in array.dims]
+    if strange or len(set(ours)) < len(ours):
+        raise DataError(
+            f"{path}: the dimensions of {array.name} are {named(list(map(str, array.dims)))}: "
+            "call them series, state, y, x"
+        )
+    return array.rename({d: meanings[str(d)] for d in array.dims if meanings[str(d)] != d})
+
+
+def _labels(array: xr.DataArray, dim: str) -> tuple[str, ...]:
+    if dim in array.coords:
+        return tuple(str(label) for label in array[dim].values.tolist())
+    return tuple(str(i + 1) for i in range(array.sizes[dim]))
+
+
+def _in_order(path: Path, frames: xr.DataArray, states: Sequence[str]) -> xr.DataArray:
+    """The frames with the states in the polarimeter's order, where the file names them."""
+    held = frames.sizes.get("state", 1)
+    if held != len(states):
+        raise DataError(
+            f"{path}: {frames.name} has {held} states, but the polarimeter {len(states)}: {named(states, 10)}"
+        )
+    if len(states) == 1 or "state" not in frames.coords or frames["state"].dtype.kind not in "OUST":
+        return frames
+    labels = _labels(frames, "state")
+    if set(labels) != set(states):
+        raise DataError(
+            f"{path}: its states are {named(labels, 10)}, but those of the polarimeter {named(states, 10)}"
+        )
+    return frames if labels == tuple(states) else frames.isel(state=[labels.index(state) for state in states])

@@ -1,0 +1,1 @@
+"""Geometries: rays, protocols of a goniometer, the light source, tables of angles."""

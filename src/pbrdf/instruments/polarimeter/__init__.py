@@ -1,0 +1,1 @@
+"""A polarimeter and its detector: analyser vectors, figures of merit, noise, files that describe them."""

@@ -1,0 +1,134 @@
+"""Analyser vectors in files: CSV for one set, netCDF for a map over the field of view."""
+
+from __future__ import annotations
+
+import csv
+import io
+from pathlib import Path
+
+import numpy as np
+
+from pbrdf.data.formats.storage import atomic_target, read_lines
+from pbrdf.errors import DataError
+from pbrdf.instruments.polarimeter.polarimeter import Polarimeter, measured
+from pbrdf.optics.stokes import STOKES
+
+__all__ = ["read_analyzer", "write_analyzer"]
+
+_COLUMNS = tuple(f"w_{name}" for name in STOKES)
+
+
+def read_analyzer(path: str | Path) -> Polarimeter:
+    """Read analyser vectors.
+
+    Parameters
+    ----------
+    path
+        ``.csv`` with the columns state, w_I, w_Q, w_U, w_V and a row for each state; or ``.nc`` with a variable
+        ``analyzer`` over (row, column, state, stokes) or (state, stokes).
+
+    Raises
+    ------
+    DataError
+        If the file cannot be read or lacks what is expected; names the file and the line.
+    """
+    path = Path(path)
+    readers = {".csv": _read_csv, ".nc": _read_netcdf}
+    reader = readers.get(path.suffix.lower())
+    if reader is None:
+        raise DataError(
+            f"{path}: the extension {path.suffix!r} cannot be read as analyser vectors; use .csv or .nc"
+        )
+    if not path.is_file():
+        raise DataError(f"{path}: there is no such file")
+    analyzer, states = reader(path)
+    try:
+        return measured(analyzer, states, path.stem)
+    except DataError as error:
+        raise DataError(f"{path}: {error}") from error
+
+
+def write_analyzer(polarimeter: Polarimeter, path: str | Path) -> None:
+    """Write the analyser vectors of a polarimeter; ``.csv`` for a single set, ``.nc`` for a map or a single set.
+
+    Raises
+    ------
+    DataError
+        If the extension does not fit or the file cannot be written.
+    """
+    path = Path(path)
+    if path.suffix.lower() == ".nc":
+        import xarray as xr
+
+        dims = ("row", "column", "state", "stokes")[-polarimeter.analyzer.ndim :]
+        stored = xr.Dataset(
+            {"analyzer": (dims, polarimeter.analyzer)},
+            {"state": list(polarimeter.states), "stokes": list(STOKES)},
+            {"title": "analyser vectors W, intensity = W·(I, Q, U, V); x towards y, V > 0 left circular"},
+        )
+        with atomic_target(path) as target:
+            stored.to_netcdf(target, engine="h5netcdf", format="NETCDF4")
+    elif path.suffix.lower() == ".csv" and not polarimeter.is_map:
+        text = io.StringIO()
+        writer = csv.writer(text, lineterminator="\n")
+        writer.writerow(["state", *_COLUMNS])
+        writer.writerows(
+            [n, *map(repr, w)] for n, w in zip(polarimeter.states, polarimeter.analyzer.tolist(), strict=True)
+        )
+        with atomic_target(path) as target:
+            target.write_text(text.getvalue(), encoding="utf-8")
+    else:
+        kind = "a map of analyser vectors" if polarimeter.is_map else "analyser vectors"
+        use = ".nc" if polarimeter.is_map else ".csv or .nc"
+        raise DataError(f"{path}: {kind} cannot be written with this extension; use {use}")
+
+
+def _read_csv(path: Path) -> tuple[np.ndarray, list[str] | None]:
+    rows = [
+        (number, row)
+        for number, row in enumerate(csv.reader(read_lines(path)), 1)
+        if row and not row[0].startswith("#")
+    ]
+    header = [name.strip() for name in rows[0][1]] if rows else []
+    expected = ["state", *_COLUMNS]
+    missing = [name for name in expected if name not in header]
+    if missing:
+        raise DataError(f"{path}: there is no column {missing[0]!r}; the columns are {', '.join(expected)}")
+    places = [header.index(name) for name in expected]
+    states, vectors = [], []
+    for number, row in rows[1:]:
+        try:
+            states.append(row[places[0]].strip())
+            vectors.append([float(row[place]) for place in places[1:]])
+        except (IndexError, ValueError):
+            raise DataError(
+                f"{path}: line {number}: give a name and the four numbers {', '.join(_COLUMNS)}"
+            ) from None
+    return np.array(vectors, dtype=float).reshape(-1, 4), states
+
+
+def _read_netcdf(path: Path) -> tuple[np.ndarray, list[str] | None]:
+    import xarray as xr
+
+    try:
+        with xr.open_dataset(path, engine="h5netcdf") as file:
+            stored = file.load()
+    except (OSError, ValueError) as error:
+        raise DataError(f"{path}: cannot be read as netCDF: {error}") from error
+    if "analyzer" not in stored:
+        raise DataError(f"{path}: there is no variable 'analyzer'")
+    array = stored["analyzer"]
+    wanted = ("row", "column", "state", "stokes")
+    if set(array.dims) not in ({*wanted}, {*wanted[2:]}):
+        raise DataError(
+            f"{path}: analyzer has the dimensions {', '.join(map(str, array.dims))}; they must be "
+            f"{', '.join(wanted)}, or the last two"
+        )
+    array = array.transpose(*(name for name in wanted if name in array.dims))
+    if "stokes" in array.coords:
+        order = [str(name) for name in array["stokes"].values]
+        if sorted(order) != sorted(STOKES):
+            raise DataError(f"{path}: the Stokes components are {', '.join(order)}; they must be I, Q, U, V")
+        array = array.sel(stokes=list(STOKES))
+    states = [str(name) for name in array["state"].values] if "state" in array.coords else None
+    return array.values, states

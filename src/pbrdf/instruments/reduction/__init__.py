@@ -1,0 +1,1 @@
+"""From frames to Stokes parameters with covariance, pixel by pixel and averaged over regions."""

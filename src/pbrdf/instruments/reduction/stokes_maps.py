@@ -1,0 +1,258 @@
+"""Files of Stokes parameters pixel by pixel, netCDF or Zarr, written one block of rows after another.
+
+Variables over (series, y, x), 32-bit floating point: ``I``, ``Q``, ``U``, ``V``; ``cov_II``, ``cov_IQ`` … ``cov_VV``,
+their covariance by detector noise (the matrix is symmetric: its elements on and above the diagonal); ``dolp``,
+``dolp_debiased``, ``dolp_std``, ``aolp``, ``aolp_std``, ``docp``, ``docp_std``; and ``flags``. Stokes parameters are in
+digital numbers, angles in degrees. The polarisation refers to the instrument's axes: x to the right in the picture, y
+upwards, angles counterclockwise. Components that the instrument does not determine have no variable; a pixel with a
+flag is NaN.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from pbrdf.data.formats.csv_columns import COVARIANCES
+from pbrdf.data.formats.zarr_folder import require_zarr
+from pbrdf.errors import DataError
+from pbrdf.instruments.frames.frames import Frames
+from pbrdf.instruments.goniometer.angle_table import AngleTable
+from pbrdf.instruments.polarimeter.instrument import Instrument
+from pbrdf.instruments.polarimeter.polarization_errors import debiased_dolp, polarization
+from pbrdf.instruments.reduction.stokes_image import PixelFlag, StokesImage
+from pbrdf.optics.stokes import STOKES
+
+__all__ = ["MapWriter", "pixel_maps"]
+
+#: Rows of a chunk of a file are so many that it holds about this many bytes.
+_CHUNK = 2**18
+
+_FLAGS = (PixelFlag.SATURATED, PixelFlag.DEAD, PixelFlag.DARK)
+
+#: Units and long name of each variable, and which Stokes components it needs.
+_VARIABLES: dict[str, tuple[str, str, tuple[int, ...]]] = {
+    **{name: ("1", f"Stokes parameter {name}, digital numbers", (k,)) for k, name in enumerate(STOKES)},
+    **{
+        name: (
+            "1",
+            f"covariance of {STOKES[i]} and {STOKES[j]}, detector noise, digital numbers squared",
+            (i, j),
+        )
+        for (i, j), name in COVARIANCES.items()
+    },
+    "dolp": ("1", "degree of linear polarisation", (0, 1, 2)),
+    "dolp_debiased": (
+        "1",
+        "degree of linear polarisation without most of the bias of noise, modified asymptotic estimator",
+        (0, 1, 2),
+    ),
+    "dolp_std": ("1", "standard error of the degree of linear polarisation", (0, 1, 2)),
+    "aolp": ("degree", "angle of linear polarisation from x (right) towards y (up)", (1, 2)),
+    "aolp_std": ("degree", "standard error of the angle of linear polarisation", (1, 2)),
+    "docp": ("1", "degree of circular polarisation", (0, 3)),
+    "docp_std": ("1", "standard error of the degree of circular polarisation", (0, 3)),
+}
+
+
+def pixel_maps(image: StokesImage, names: Sequence[str]) -> dict[str, np.ndarray]:
+    """What is stored of some rows.
+
+    Parameters
+    ----------
+    image
+        The rows, reduced.
+    names
+        Which variables, of :attr:`MapWriter.names`.
+
+    Returns
+    -------
+    dict of str to ndarray
+        By the name of the variable, float32 but for the flags, angles in degrees, shape (rows, columns).
+    """
+    good = image.flags == 0
+    stokes = np.where(good, image.stokes, np.nan)
+    covariance = np.where(good, image.covariance, np.nan)
+    found = polarization(stokes, covariance)
+    values = {
+        **dict(zip(STOKES, stokes, strict=True)),
+        **{name: covariance[i, j] for (i, j), name in COVARIANCES.items()},
+        "dolp": found.dolp,
+        "dolp_debiased": debiased_dolp(stokes, covariance),
+        "dolp_std": found.dolp_std,
+        "aolp": np.rad2deg(found.aolp),
+        "aolp_std": np.rad2deg(found.aolp_std),
+        "docp": found.docp,
+        "docp_std": found.docp_std,
+    }
+    return {
+        name: image.flags if name == "flags" else values[name].astype(np.float32, copy=False)
+        for name in names
+    }
+
+
+class MapWriter:
+    """A file of Stokes parameters being written; use it in a ``with`` statement.
+
+    Parameters
+    ----------
+    path
+        The new file, ``.nc``, or folder, ``.zarr``; nothing of that name must exist.
+    frames, instrument
+        What was measured, and with what.
+    angles
+        Angles of the series, if they are known.
+    attrs
+        Further attributes of the file.
+
+    Attributes
+    ----------
+    names
+        Of the variables.
+
+    Raises
+    ------
+    DataError
+        If the extension is another one, or zarr is not installed.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        frames: Frames,
+        instrument: Instrument,
+        *,
+        angles: AngleTable | None = None,
+        attrs: dict[str, Any] | None = None,
+    ) -> None:
+        kind = path.suffix.lower()
+        if kind not in (".nc", ".zarr"):
+            raise DataError(f"{path}: Stokes pictures are written as .nc or .zarr")
+        head = _head(frames, instrument, angles, attrs or {})
+        shape = (len(frames.names), frames.rows, frames.columns)
+        chunks = (1, min(max(_CHUNK // (4 * frames.columns), 1), frames.rows), frames.columns)
+        self._rows, self._chunk_rows = frames.rows, chunks[1]
+        self._file: Any
+        if kind == ".nc":
+            import h5netcdf
+
+            head.to_netcdf(path, engine="h5netcdf")
+            self._file = h5netcdf.File(path, "a")
+        else:
+            require_zarr(path)
+            import zarr
+
+            head.to_zarr(path, mode="w-", zarr_format=2, consolidated=False)
+            self._file = zarr.open_group(path, mode="r+", zarr_format=2)
+        masks = {
+            "long_name": "why a pixel was left out; 0 is a good pixel",
+            "flag_masks": np.array([flag.value for flag in _FLAGS], dtype=np.uint8).tolist(),
+            "flag_meanings": " ".join(str(flag.name).lower() for flag in _FLAGS),
+        }
+        determined = instrument.polarimeter.determined
+        described = {
+            name: {"units": units, "long_name": words}
+            for name, (units, words, needs) in _VARIABLES.items()
+            if determined[list(needs)].all()
+        }
+        self._variables = {
+            name: self._create(kind, name, shape, chunks, attributes)
+            for name, attributes in {**described, "flags": masks}.items()
+        }
+        self.names = tuple(self._variables)
+        self._part = {name: np.empty(chunks[1:], _type(name)) for name in self.names}
+        if kind == ".nc":
+            # the file is complete but for its numbers, and h5py writes small parts of them faster
+            import h5py
+
+            self._file.close()
+            # rows come in order: one chunk of each variable has to be kept, not the usual megabytes
+            self._file = h5py.File(path, "r+", rdcc_nbytes=2 * _CHUNK)
+            self._variables = {name: self._file[name] for name in self.names}
+
+    def _create(
+        self,
+        kind: str,
+        name: str,
+        shape: tuple[int, ...],
+        chunks: tuple[int, ...],
+        attributes: dict[str, Any],
+    ) -> Any:
+        dims = ("series", "y", "x")
+        dtype = _type(name)
+        # a flag is never missing: 0 is a good pixel
+        fill = None if name == "flags" else np.float32(np.nan)
+        if kind == ".nc":
+            variable = self._file.create_variable(name, dims, dtype, chunks=chunks, fillvalue=fill)
+        else:
+            variable = self._file.create_array(name, shape=shape, chunks=chunks, dtype=dtype, fill_value=fill)
+            attributes = {**attributes, "_ARRAY_DIMENSIONS": list(dims)}
+        for key, value in attributes.items():
+            variable.attrs[key] = value
+        return variable
+
+    def write(self, series: int, first_row: int, maps: dict[str, np.ndarray]) -> None:
+        """Write what :func:`pixel_maps` made of some rows of a series; all rows must come, in their order."""
+        # whole chunks only: a part of a chunk would make the file be read, packed and written again
+        high, rows = self._chunk_rows, self._rows
+        done, count = 0, len(maps["flags"])
+        while done < count:
+            row = first_row + done
+            start, end = row // high * high, min((row // high + 1) * high, rows)
+            taken = min(end - row, count - done)
+            for name, part in self._part.items():
+                part[row - start : row - start + taken] = maps[name][done : done + taken]
+                if row + taken == end:
+                    self._variables[name][series, start:end, :] = part[: end - start]
+            done += taken
+
+    def __enter__(self) -> MapWriter:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if hasattr(self._file, "close"):
+            self._file.close()
+
+
+def _type(name: str) -> np.dtype[Any]:
+    return np.dtype(np.uint8 if name == "flags" else np.float32)
+
+
+def _head(
+    frames: Frames, instrument: Instrument, angles: AngleTable | None, attrs: dict[str, Any]
+) -> xr.Dataset:
+    """Coordinates and attributes."""
+    coords: dict[str, Any] = {
+        "series": ("series", list(frames.names)),
+        "y": ("y", np.arange(frames.rows), {"units": "1", "long_name": "row, from the top"}),
+        "x": ("x", np.arange(frames.columns), {"units": "1", "long_name": "column, from the left"}),
+    }
+    reference = np.rad2deg(instrument.reference_angle)
+    if angles is not None:
+        table = angles.rows(frames.names)
+        for name in ("theta_i", "theta_r", "phi", "sample_angle"):
+            coords[name] = ("series", np.rad2deg(getattr(table, name)), {"units": "degree"})
+        own = np.rad2deg(table.reference_angle)
+        coords["reference_angle"] = ("series", np.where(np.isnan(own), reference, own), {"units": "degree"})
+        coords["exposure"] = ("series", np.asarray(table.exposure), {"long_name": "exposure time, relative"})
+        if table.wavelength is not None:
+            coords["wavelength"] = ("series", np.asarray(table.wavelength), {"units": "nm"})
+    polarimeter, detector = instrument.polarimeter, instrument.detector
+    described = {
+        "axes": "x to the right in the picture, y upwards, angles counterclockwise as the receiver sees them",
+        "instrument": polarimeter.name,
+        "polarimeter": json.dumps(polarimeter.details, ensure_ascii=False),
+        "states": ", ".join(polarimeter.states),
+        "accuracy_linear": float(polarimeter.accuracy[0]),
+        "accuracy_circular": float(polarimeter.accuracy[1]),
+        "detector": json.dumps(asdict(detector)),
+        "reference_angle_degree": float(reference),
+        "stability": float(instrument.stability),
+    }
+    return xr.Dataset(coords=coords, attrs={**described, **attrs})

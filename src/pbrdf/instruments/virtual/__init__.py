@@ -1,0 +1,1 @@
+"""A measurement that never was: from a model to raw frames."""

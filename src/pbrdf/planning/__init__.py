@@ -1,0 +1,1 @@
+"""Planning of measurements: which geometries tell most about a model's parameters."""

@@ -1,0 +1,1 @@
+"""Measured data in words, and drawn with a model's values beside them."""

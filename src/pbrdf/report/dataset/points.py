@@ -1,0 +1,174 @@
+"""Measured points, with the modelled ones beside them, as the figures draw them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pbrdf.data.covariance import correlations
+from pbrdf.data.schema import COVARIANCE
+from pbrdf.data.select import to_brdf_scale
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from pbrdf.report.fit.subject import Report
+
+__all__ = ["Channel", "Points", "dolp_uncertainty"]
+
+
+@dataclass(frozen=True)
+class Channel:
+    """Intensity or DoLP over the geometries; NaN where there is nothing.
+
+    Attributes
+    ----------
+    measured, std, modelled
+        Shape (G,). ``modelled`` is all NaN where there is no model.
+    """
+
+    measured: np.ndarray
+    std: np.ndarray
+    modelled: np.ndarray
+
+
+@dataclass(frozen=True)
+class Points:
+    """What was measured, and where.
+
+    Attributes
+    ----------
+    theta_i, theta_r, phi
+        Degrees, shape (G,); φ within −180 … 180.
+    group
+        Labels as text, shape (G,).
+    held_out
+        Whether a fit left the point out, shape (G,).
+    intensity, dolp
+        Intensity on the scale of a BRDF and degree of linear polarisation; ``dolp`` is None if it was not
+        measured.
+    arbitrary_scale
+        Whether the intensity has an unknown constant factor.
+    diffuse
+        Whether a stepwise fit used the point for its diffuse step, shape (G,); None without such a step.
+    """
+
+    theta_i: np.ndarray
+    theta_r: np.ndarray
+    phi: np.ndarray
+    group: np.ndarray
+    held_out: np.ndarray
+    intensity: Channel
+    dolp: Channel | None
+    arbitrary_scale: bool
+    diffuse: np.ndarray | None = None
+
+    @classmethod
+    def from_fit(cls, report: Report) -> Points:
+        """The points of a fit, with the model's values."""
+        comparison = report.result.comparison
+        bare = cls.from_dataset(report.dataset)
+        nothing = np.full(bare.theta_i.shape, np.nan)
+
+        # Noise that the fit had to assume is no uncertainty of the measurement: no bars are drawn of it.
+        stated = report.result.std_known or report.settings.get("noise") is not None
+
+        def column(name: str) -> np.ndarray:
+            known = name in comparison and (stated or not name.endswith("_std"))
+            return comparison[name].values if known else nothing
+
+        dolp = None
+        if bare.dolp is not None:
+            std = column("dolp_std")
+            if "dolp_std" not in comparison and "I_std" in comparison:
+                q, u = ("Q", "U") if "Q_std" in comparison else ("m10", "m20")
+                std = dolp_uncertainty(
+                    *(column(f"{name}_measured") for name in ("I", q, u)),
+                    *(column(f"{name}_std") for name in ("I", q, u)),
+                    correlation=None
+                    if report.result.data.correlation is None
+                    else _correlation(report.dataset),
+                )
+            dolp = Channel(column("dolp_measured"), std, column("dolp_modelled"))
+        return cls(
+            theta_i=bare.theta_i,
+            theta_r=bare.theta_r,
+            phi=bare.phi,
+            group=bare.group,
+            held_out=comparison["held_out"].values,
+            intensity=Channel(column("I_measured"), column("I_std"), column("I_modelled")),
+            dolp=dolp,
+            arbitrary_scale=bare.arbitrary_scale,
+            diffuse=comparison["used_for_diffuse"].values if "used_for_diffuse" in comparison else None,
+        )
+
+    @classmethod
+    def from_dataset(cls, dataset: xr.Dataset) -> Points:
+        """The points of a data set, without a model."""
+        ds = to_brdf_scale(dataset)
+        nothing = np.full(ds.sizes["geometry"], np.nan)
+
+        def column(name: str) -> np.ndarray:
+            return ds[name].values if name in ds else nothing
+
+        if "mueller" in ds:
+            M = ds["mueller"].values
+            S = np.array(column("mueller_std") if "mueller_std" in ds else np.full(M.shape, np.nan))
+            stokes, std = [M[:, i, 0] for i in range(3)], [S[:, i, 0] for i in range(3)]
+        else:
+            stokes = [column(name) for name in "IQU"]
+            std = [column(f"{name}_std") for name in "IQU"]
+        dolp = None
+        if "dolp" in ds:
+            dolp = Channel(column("dolp"), column("dolp_std"), nothing)
+        elif np.isfinite(stokes[1]).any():
+            with np.errstate(divide="ignore", invalid="ignore"):
+                value = np.hypot(stokes[1], np.nan_to_num(stokes[2])) / stokes[0]
+            dolp = Channel(value, dolp_uncertainty(*stokes, *std, correlation=_correlation(ds)), nothing)
+        phi = np.rad2deg(ds["phi"].values)
+        return cls(
+            theta_i=np.rad2deg(ds["theta_i"].values),
+            theta_r=np.rad2deg(ds["theta_r"].values),
+            phi=180.0 - (180.0 - phi) % 360.0,
+            group=ds["group"].values.astype(str),
+            held_out=np.zeros(nothing.shape, dtype=bool),
+            intensity=Channel(stokes[0], std[0], nothing),
+            dolp=dolp,
+            arbitrary_scale=ds.attrs.get("scale") == "arbitrary",
+        )
+
+
+def _correlation(ds: xr.Dataset) -> np.ndarray | None:
+    return correlations(ds[COVARIANCE].values) if COVARIANCE in ds.data_vars else None
+
+
+def dolp_uncertainty(
+    I: np.ndarray,  # noqa: E741
+    Q: np.ndarray,
+    U: np.ndarray,
+    s_I: np.ndarray,
+    s_Q: np.ndarray,
+    s_U: np.ndarray,
+    *,
+    correlation: np.ndarray | None = None,
+) -> np.ndarray:
+    """Standard uncertainty of √(Q² + U²)/I, to first order.
+
+    U may be NaN throughout (not measured). Where Q = U = 0, where the first order fails, it is that of Q/I.
+    ``correlation`` is that of the errors of I, Q, U and V, shape (G, 4, 4); None for independent ones.
+    """
+    U, s_U = np.nan_to_num(U), np.nan_to_num(s_U)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        size = np.hypot(Q, U)
+        cosine, sine = np.where(size > 0.0, Q / size, 1.0), np.where(size > 0.0, U / size, 0.0)
+        parts = np.stack([-size / I * s_I, cosine * s_Q, sine * s_U], axis=-1)
+        if correlation is None:
+            variance = (parts**2).sum(axis=-1)
+        else:
+            # rounding may leave a fully correlated difference below 0
+            variance = np.maximum(
+                np.einsum("...i,...ij,...j->...", parts, correlation[..., :3, :3], parts), 0.0
+            )
+        return np.sqrt(variance) / np.abs(I)

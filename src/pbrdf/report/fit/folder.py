@@ -1,0 +1,219 @@
+"""The folder that a fit leaves behind."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+import pbrdf
+from pbrdf.data.formats.storage import exact_degrees, name_beside
+from pbrdf.errors import DataError
+from pbrdf.report.dataset.describe import shown_unit
+from pbrdf.report.fit.subject import Report
+from pbrdf.report.fit.summary import summary_text
+from pbrdf.report.numbers import plain
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from pbrdf.inversion.fit import Estimate
+
+__all__ = [
+    "FIGURE_FORMATS",
+    "comparison_file",
+    "complete_folder",
+    "fit_record",
+    "require_writable",
+    "write_report",
+]
+
+FIGURE_FORMATS = ("png", "pdf", "svg")
+
+
+def require_writable(directory: Path) -> None:
+    """Check before long work that a folder of this name can be made or filled, leaving nothing behind.
+
+    Raises
+    ------
+    DataError
+        If it cannot; the message says why.
+    """
+    if directory.exists() and not directory.is_dir():
+        raise DataError(f"{directory}: there is a file of that name; choose another folder with --output")
+    trial = name_beside(directory.resolve())
+    missing = [p for p in directory.parents if not p.exists()]
+    try:
+        trial.mkdir(parents=True)
+        trial.rmdir()
+    except OSError as error:
+        raise DataError(f"{directory}: cannot be written: {error.strerror or error}") from error
+    finally:
+        for parent in missing:  # innermost first
+            if parent.is_dir():
+                parent.rmdir()
+
+
+def write_report(report: Report, directory: Path, *, figure_format: str = "png") -> list[Path]:
+    """Write the model, the numbers, the comparison, the figures and the summary of a fit, all or nothing.
+
+    Parameters
+    ----------
+    report
+        What is reported on.
+    directory
+        The folder; made if it is missing.
+    figure_format
+        ``"png"``, ``"pdf"`` or ``"svg"``.
+
+    Returns
+    -------
+    list of Path
+        The files, in the order of their importance to a reader.
+
+    Raises
+    ------
+    DataError
+        If the folder cannot be written.
+    """
+    from pbrdf.report.fit.contour_figure import contour_figure
+    from pbrdf.report.fit.figures import fit_figure, save_figure, starts_figure
+
+    names = ["summary.txt", f"figure.{figure_format}", "model.json", "fit.json", "comparison.nc"]
+    names.append(f"starts.{figure_format}")
+    with complete_folder(directory) as temporary:
+        (temporary / "summary.txt").write_text(summary_text(report), encoding="utf-8")
+        save_figure(fit_figure(report), temporary / f"figure.{figure_format}")
+        report.result.model.to_json(temporary / "model.json")
+        record = json.dumps(fit_record(report), indent=2, ensure_ascii=False, allow_nan=False)
+        (temporary / "fit.json").write_text(record + "\n", encoding="utf-8")
+        comparison_file(report).to_netcdf(temporary / "comparison.nc", engine="h5netcdf")
+        save_figure(starts_figure(report), temporary / f"starts.{figure_format}")
+        if report.checks is not None and report.checks.contours:
+            save_figure(contour_figure(report), temporary / f"contours.{figure_format}")
+            names.append(f"contours.{figure_format}")
+    return [directory / name for name in names]
+
+
+@contextmanager
+def complete_folder(directory: Path) -> Iterator[Path]:
+    """A folder to fill that becomes `directory` when the block ends well, and goes otherwise.
+
+    A new folder appears complete; in one that is there, the files of the same names are replaced and others are left
+    alone.
+
+    Raises
+    ------
+    DataError
+        If the folder cannot be written.
+    """
+    temporary = name_beside(directory.resolve())
+    try:
+        temporary.mkdir(parents=True)
+        yield temporary
+        if directory.is_dir():
+            _move_into(temporary, directory)
+        else:
+            temporary.rename(directory)
+    except OSError as error:
+        raise DataError(f"{directory}: cannot be written: {error.strerror or error}") from error
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+def _move_into(folder: Path, target: Path) -> None:
+    """Move what a folder holds; folders of the same name are filled, but one of Zarr is one thing and is replaced."""
+    for entry in sorted(folder.iterdir()):
+        place = target / entry.name
+        if entry.is_dir() and entry.suffix != ".zarr":
+            place.mkdir(exist_ok=True)
+            _move_into(entry, place)
+        else:
+            if entry.is_dir() and place.is_dir():
+                shutil.rmtree(place)
+            entry.replace(place)
+
+
+def fit_record(report: Report) -> dict[str, Any]:
+    """Everything a program may want to know of a fit, in types that JSON has (NaN as None), angles in
+    degrees."""
+    result = report.result
+    factor = {name: shown_unit(e.parameter)[0] for name, e in result.estimates.items()}
+    record = {
+        "pbrdf": pbrdf.__version__,
+        "data": {
+            "name": report.name,
+            **{
+                key: report.dataset.attrs[key]
+                for key in ("title", "source", "quantity")
+                if key in report.dataset.attrs
+            },
+            "geometries": report.dataset.sizes["geometry"],
+            "held_out_geometries": int(result.comparison["held_out"].values.sum()),
+        },
+        "settings": dict(report.settings),
+        "model": result.model.to_dict(),
+        "estimates": {name: _estimate(e) for name, e in result.estimates.items()},
+        "correlation": {
+            "parameters": [str(n) for n in result.correlation["parameter"].values],
+            "matrix": result.correlation.values,
+        },
+        "goodness": asdict(result.goodness),
+        "optima": [
+            {**asdict(o), "values": {name: v * factor[name] for name, v in o.values.items()}}
+            for o in result.optima
+        ],
+        "stages": [asdict(stage) for stage in result.stages],
+        "starts": result.starts,
+        "converged": result.converged,
+        "noise": result.noise,
+        "uncertainties_from_data": result.std_known,
+        "hold_out": None if result.hold_out is None else str(result.hold_out),
+        "fitted_errors": {region: asdict(errors) for region, errors in result.fitted.items()},
+        "predicted_errors": {region: asdict(errors) for region, errors in result.predicted.items()},
+        "notes": result.notes,
+        "checks": None if report.checks is None else report.checks.record(result),
+    }
+    return plain(record)  # type: ignore[return-value]
+
+
+def _estimate(estimate: Estimate) -> dict[str, Any]:
+    factor, unit = shown_unit(estimate.parameter)
+    return {
+        "value": factor * estimate.value,
+        "standard_error": factor * estimate.std,
+        "unit": "degree" if unit == "°" else unit,
+        "lower": factor * estimate.lower,
+        "upper": factor * estimate.upper,
+        "verdict": estimate.verdict,
+    }
+
+
+def comparison_file(report: Report) -> xr.Dataset:
+    """Measured, modelled and residual values as they stand in the file: angles in degrees, described."""
+    result = report.result
+    ds = result.comparison.copy()
+    for name in ("theta_i", "theta_r", "phi", "facet_tilt"):
+        radians = ds[name].values
+        degrees = exact_degrees(radians)
+        ds[name] = (ds[name].dims, np.rad2deg(radians) if degrees is None else degrees, {"units": "degree"})
+    for name in [str(n) for n in ds.data_vars if ds[n].dtype == bool]:
+        ds[name] = (
+            ds[name].astype(np.int8).assign_attrs(long_name=name.replace("_", " "), flag_values="0 no, 1 yes")
+        )
+    ds.attrs = {
+        "title": f"{result.model.name} fitted to {report.name}",
+        "source": f"pbrdf {pbrdf.__version__}",
+        "data": str(report.dataset.attrs.get("title", report.name)),
+        "model": json.dumps(result.model.to_dict(), ensure_ascii=False),
+        "noise": result.noise,
+        "hold_out": "" if result.hold_out is None else str(result.hold_out),
+        "values": "on the scale of a BRDF; residual = modelled - measured; Q = I_p - I_s; phi = 0 forward",
+    }
+    return ds

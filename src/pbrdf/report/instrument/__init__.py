@@ -1,0 +1,1 @@
+"""A polarimeter and its calibration in words and figures."""

@@ -1,0 +1,1 @@
+"""A plan of measurements in words and as a figure."""

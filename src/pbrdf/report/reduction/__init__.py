@@ -1,0 +1,1 @@
+"""A reduction in words, pictures and files."""

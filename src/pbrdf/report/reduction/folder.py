@@ -1,0 +1,172 @@
+"""The folder that a reduction leaves behind, written while the frames are read once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+import pbrdf
+from pbrdf.data.readers import write
+from pbrdf.errors import DataError
+from pbrdf.instruments.frames.frames import Frames
+from pbrdf.instruments.goniometer.angle_table import AngleTable
+from pbrdf.instruments.polarimeter.instrument import Instrument
+from pbrdf.instruments.reduction.regions import Rectangle, Region, RegionAverage
+from pbrdf.instruments.reduction.series import RegionCollector, datasets_of_averages, require_same_series
+from pbrdf.instruments.reduction.stokes_maps import MapWriter, pixel_maps
+from pbrdf.instruments.reduction.streaming import DEFAULT_MEMORY, Block, reduced_blocks
+from pbrdf.report.fit.folder import complete_folder
+from pbrdf.report.reduction.gallery import Gallery, safe_name
+from pbrdf.report.reduction.picture_sums import BlockSums
+from pbrdf.report.reduction.summary import write_averages
+
+__all__ = ["WHOLE_PICTURE", "Reduction", "Wanted", "write_reduction"]
+
+#: What tables call the average over all pixels.
+WHOLE_PICTURE = "(whole picture)"
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What is to be made of the frames.
+
+    Attributes
+    ----------
+    maps
+        Stokes parameters pixel by pixel: ``"nc"``, ``"zarr"``, or None.
+    pictures
+        Quick-look pictures.
+    regions
+        To be averaged over, besides the whole picture.
+    angles
+        Of the series; with them each region gives a goniometric data set.
+    datasets
+        Extension of those, ``".csv"`` or ``".nc"``.
+    """
+
+    maps: str | None = "nc"
+    pictures: bool = True
+    regions: Mapping[str, Region] = field(default_factory=dict)
+    angles: AngleTable | None = None
+    datasets: str = ".csv"
+
+
+@dataclass(frozen=True)
+class Reduction:
+    """What was found, and the files it is in.
+
+    Attributes
+    ----------
+    averages
+        For each region, and the whole picture, the average in each series.
+    files
+        In the order of their importance to a reader.
+    """
+
+    averages: dict[str, list[RegionAverage]]
+    files: list[Path]
+
+
+def write_reduction(
+    frames: Frames,
+    instrument: Instrument,
+    directory: Path,
+    wanted: Wanted,
+    *,
+    name: str,
+    dark_level: float = 0.0,
+    weighted: bool = True,
+    max_memory: int = DEFAULT_MEMORY,
+    progress: Callable[[int, int], None] | None = None,
+) -> Reduction:
+    """Reduce frames and write what is wanted.
+
+    Everything is written beside the folder first. A new folder appears complete; in one that is there, the files of the
+    same names are replaced and others are left alone.
+
+    Parameters
+    ----------
+    frames, instrument
+        What was measured, and with what.
+    directory
+        The folder.
+    wanted
+        What to write.
+    name
+        What to call the frames.
+    dark_level, weighted, max_memory, progress
+        See :func:`pbrdf.instruments.reduction.streaming.reduced_blocks`.
+
+    Raises
+    ------
+    DataError
+        If the input does not fit together or the folder cannot be written.
+    """
+    regions = {WHOLE_PICTURE: Rectangle(0, frames.columns, 0, frames.rows), **wanted.regions}
+    collector = RegionCollector(regions, frames)
+    file_names = _file_names(wanted.regions)
+    if wanted.angles is not None:
+        require_same_series(frames.names, wanted.angles)
+    names: list[str] = []
+    with complete_folder(directory) as temporary:
+        gallery = Gallery(frames, temporary, name, wanted.regions) if wanted.pictures else None
+        with ExitStack() as stack:
+            maps: MapWriter | None = None
+            if wanted.maps is not None:
+                names.append(f"stokes.{wanted.maps}")
+                described = {"title": f"Stokes parameters of {name}", "source": f"pbrdf {pbrdf.__version__}"}
+                maps = MapWriter(
+                    temporary / names[-1], frames, instrument, angles=wanted.angles, attrs=described
+                )
+                stack.enter_context(maps)
+
+            def finish(block: Block) -> tuple[Block, dict[str, np.ndarray] | None, BlockSums | None]:
+                pixels = None if maps is None else pixel_maps(block.image, maps.names)
+                sums = None if gallery is None else gallery.sums(block.series, block.first_row, block.image)
+                return block, pixels, sums
+
+            for block, pixels, sums in reduced_blocks(
+                frames,
+                instrument,
+                finish,
+                dark_level=dark_level,
+                weighted=weighted,
+                max_memory=max_memory,
+                progress=progress,
+            ):
+                collector.add(block)
+                if maps is not None and pixels is not None:
+                    maps.write(block.series, block.first_row, pixels)
+                if gallery is not None:
+                    gallery.add(block.series, sums)
+        averages = collector.averages(instrument)
+        write_averages(averages, frames.names, temporary / "summary.csv")
+        names.insert(0, "summary.csv")
+        if wanted.angles is not None:
+            measured = {region: averages[region] for region in wanted.regions}
+            attrs = {"source": f"{name}, reduced by pbrdf {pbrdf.__version__}"}
+            datasets = datasets_of_averages(measured, frames.names, instrument, wanted.angles, attrs=attrs)
+            for region, dataset in datasets.items():
+                write(dataset, temporary / f"{file_names[region]}{wanted.datasets}")
+                names.append(f"{file_names[region]}{wanted.datasets}")
+        if gallery is not None:
+            gallery.close()
+            names += gallery.files
+    return Reduction(averages, [directory / n for n in names])
+
+
+def _file_names(regions: Mapping[str, Region]) -> dict[str, str]:
+    """What the files of regions are called, without extension."""
+    found: dict[str, str] = {}
+    for region in regions:
+        if region == WHOLE_PICTURE or not region.isprintable():
+            raise DataError(f"region {region!r}: this cannot be its name: choose another")
+        safe = safe_name(region)
+        if safe in found.values() or safe in ("summary", "stokes"):
+            raise DataError(f"region {region!r}: its file {safe!r} would be another's: choose another name")
+        found[region] = safe
+    return found

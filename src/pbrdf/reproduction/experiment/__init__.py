@@ -1,0 +1,1 @@
+"""The paper's measurement, simulated, and what the inversion made of it."""

@@ -1,0 +1,1 @@
+"""The reproduction as one page, its tables, and in a few lines for a terminal."""

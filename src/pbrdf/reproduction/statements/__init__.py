@@ -1,0 +1,1 @@
+"""The paper's statements, each as a test of the model."""

@@ -1,0 +1,91 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+from dataset_strategies import datasets, same_bits
+from hypothesis import HealthCheck, given, settings
+from numpy.testing import assert_allclose, assert_array_equal
+
+from pbrdf.data import make_dataset
+from pbrdf.data.formats.netcdf import read_netcdf, write_netcdf
+from pbrdf.errors import DataError
+
+
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(ds=datasets())
+def test_round_trip_is_bit_for_bit(tmp_path, ds):
+    write_netcdf(ds, tmp_path / "data.nc")
+    assert same_bits(read_netcdf(tmp_path / "data.nc"), ds)
+
+
+@pytest.mark.parametrize(
+    "attrs",
+    [
+        {"title": "", "note": "json:[1]", "lines": 'a "b"\n\tc', "nul": "a\0b", "greek": "φ = 0 → вперёд"},
+        {
+            "empty": [],
+            "one": [1],
+            "one_text": ["a"],
+            "texts": ["a,b", "", "ö"],
+            "floats": [0.1, 2.0],
+            "n": -3,
+        },
+    ],
+)
+def test_attributes_of_every_kind_survive(tmp_path, attrs):
+    ds = make_dataset(0.1, 0.2, 0.0, quantity="brdf", I=1.0, attrs=attrs)
+    write_netcdf(ds, tmp_path / "data.nc")
+    assert same_bits(read_netcdf(tmp_path / "data.nc"), ds)
+
+
+def test_angles_are_stored_in_degrees_with_their_unit(tmp_path):
+    ds = make_dataset(
+        np.deg2rad(30.0), np.deg2rad(45.0), np.pi, quantity="brdf", I=1.0, dolp=0.1, aolp=np.pi / 2
+    )
+    write_netcdf(ds, tmp_path / "data.nc")
+    with xr.open_dataset(tmp_path / "data.nc", engine="h5netcdf") as stored:
+        for name, value in [("theta_i", 30.0), ("theta_r", 45.0), ("phi", 180.0), ("aolp", 90.0)]:
+            assert stored[name].attrs["units"] == "degree"
+            assert stored[name].values[0] == value
+
+
+def test_strangers_units_are_converted_and_strangers_variables_listed(tmp_path):
+    ds = make_dataset([0.1, 0.2], 0.2, 0.0, quantity="brdf", I=1.0, wavelength=500.0)
+    stored = ds.assign(temperature=("geometry", [20.0, 21.0]))
+    stored["theta_i"] = ("geometry", [30.0, 60.0], {"units": "degrees"})
+    stored["wavelength"] = ("geometry", [0.5, 0.6], {"units": "um"})
+    stored.set_coords(["theta_i", "wavelength"]).to_netcdf(tmp_path / "data.nc", engine="h5netcdf")
+    read = read_netcdf(tmp_path / "data.nc")
+    assert_allclose(read["theta_i"], np.deg2rad([30.0, 60.0]))
+    assert_array_equal(read["wavelength"], [500.0, 600.0])
+    assert read["wavelength"].attrs["units"] == "nm"
+    assert read.attrs["ignored_variables"] == ["temperature"]
+
+
+def test_units_that_are_not_understood_are_named(tmp_path):
+    ds = make_dataset(0.1, 0.2, 0.0, quantity="brdf", I=1.0)
+    ds["phi"].attrs["units"] = "gon"
+    ds.to_netcdf(tmp_path / "data.nc", engine="h5netcdf")
+    with pytest.raises(DataError, match=r"data\.nc: the units 'gon' of phi"):
+        read_netcdf(tmp_path / "data.nc")
+
+
+def test_a_file_that_breaks_the_schema_is_named(tmp_path):
+    xr.Dataset({"I": ("x", [1.0])}).to_netcdf(tmp_path / "data.nc", engine="h5netcdf")
+    with pytest.raises(DataError, match=r"data\.nc does not follow the schema: .*; .*") as caught:
+        read_netcdf(tmp_path / "data.nc")
+    assert "\n" not in str(caught.value)
+
+
+def test_a_file_that_is_not_netcdf_is_named(text_file):
+    with pytest.raises(DataError, match=r"data\.nc: cannot be read as netCDF"):
+        read_netcdf(text_file("no", "data.nc"))
+
+
+def test_invalid_data_are_not_written(tmp_path):
+    ds = make_dataset(0.1, 0.2, 0.0, quantity="brdf", I=1.0)
+    ds["theta_i"][0] = 2.0
+    with pytest.raises(DataError, match="theta_i"):
+        write_netcdf(ds, tmp_path / "data.nc")
+    assert list(tmp_path.iterdir()) == []

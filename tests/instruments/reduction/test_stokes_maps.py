@@ -1,0 +1,101 @@
+"""The file of every pixel holds what the reduction found, as netCDF and as Zarr."""
+
+import json
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from pbrdf.data.formats.csv_columns import COVARIANCES
+from pbrdf.errors import DataError
+from pbrdf.instruments.frames.frames import ArrayFrames
+from pbrdf.instruments.goniometer.angle_table import AngleTable
+from pbrdf.instruments.polarimeter.detector import Detector
+from pbrdf.instruments.polarimeter.instrument import Instrument
+from pbrdf.instruments.polarimeter.polarimeter import lcvr, rotating_polarizer
+from pbrdf.instruments.polarimeter.polarization_errors import debiased_dolp, polarization
+from pbrdf.instruments.polarimeter.retardance_sets import retardance_set
+from pbrdf.instruments.reduction.stokes_image import reduce_frames
+from pbrdf.instruments.reduction.stokes_maps import MapWriter, pixel_maps
+from pbrdf.instruments.reduction.streaming import reduced_blocks
+
+DETECTOR = Detector(bits=12, gain=3.0, read_noise=5.0, offset=60.0)
+
+
+def written(path, polarimeter, frames, **options):
+    instrument = Instrument(polarimeter, DETECTOR, reference_angle=np.deg2rad(20.0))
+    with MapWriter(path, frames, instrument, **options) as maps:
+        blocks = reduced_blocks(
+            frames,
+            instrument,
+            lambda block: (block.series, block.first_row, pixel_maps(block.image, maps.names)),
+            max_memory=1_000_000,
+        )
+        for block in blocks:
+            maps.write(*block)
+    if path.suffix == ".zarr":
+        return xr.open_dataset(path, engine="zarr", consolidated=False).load()
+    return xr.open_dataset(path, engine="h5netcdf").load()
+
+
+@pytest.fixture
+def frames():
+    raw = np.random.default_rng(3).integers(80, 3000, (2, 4, 300, 40)).astype(np.uint16)
+    raw[1, 2, 7, 5] = 4095
+    return ArrayFrames(raw, ("first", "second"))
+
+
+@pytest.mark.parametrize("kind", ["nc", "zarr"])
+def test_what_was_found_is_read_back(tmp_path, frames, kind):
+    if kind == "zarr":
+        pytest.importorskip("zarr")
+    polarimeter = lcvr(retardance_set("tetrahedron"))
+    file = written(tmp_path / f"stokes.{kind}", polarimeter, frames)
+    assert file["series"].values.tolist() == ["first", "second"]
+    for s in range(2):
+        image = reduce_frames(frames.array[s], polarimeter, DETECTOR)
+        found = polarization(image.stokes, image.covariance)
+        expected = {
+            **dict(zip("IQUV", image.stokes, strict=True)),
+            **{name: image.covariance[i, j] for (i, j), name in COVARIANCES.items()},
+            "dolp": found.dolp,
+            "dolp_debiased": debiased_dolp(image.stokes, image.covariance),
+            "dolp_std": found.dolp_std,
+            "aolp": np.rad2deg(found.aolp),
+            "aolp_std": np.rad2deg(found.aolp_std),
+            "docp": found.docp,
+            "docp_std": found.docp_std,
+            "flags": image.flags,
+        }
+        assert set(expected) == set(file.data_vars)
+        for name, values in expected.items():
+            assert file[name].dims == ("series", "y", "x")
+            np.testing.assert_allclose(file[name].values[s], values, rtol=1e-6, atol=1e-6, err_msg=name)
+    assert file["flags"].values[1, 7, 5] == 1
+    assert file["flags"].attrs["flag_meanings"] == "saturated dead dark"
+    assert np.isnan(file["I"].values[1, 7, 5])
+    assert file["aolp"].attrs["units"] == "degree"
+    assert json.loads(file.attrs["polarimeter"])["kind"] == "lcvr"
+    assert json.loads(file.attrs["detector"])["bits"] == 12
+    assert file.attrs["reference_angle_degree"] == pytest.approx(20.0)
+
+
+def test_components_that_are_not_determined_have_no_variable(tmp_path, frames):
+    file = written(tmp_path / "stokes.nc", rotating_polarizer(np.deg2rad([0, 45, 90, 135])), frames)
+    assert {"I", "Q", "U", "cov_QU", "aolp"} <= set(file.data_vars)
+    assert not {"V", "cov_IV", "cov_VV", "docp", "docp_std"} & set(file.data_vars)
+
+
+def test_angles_stand_beside_the_series(tmp_path, frames):
+    table = AngleTable(
+        ("second", "first"), np.deg2rad([20.0, 10.0]), np.deg2rad([30.0, 40.0]), reference_angle=[np.nan, 0.0]
+    )
+    file = written(tmp_path / "stokes.nc", lcvr(retardance_set("tetrahedron")), frames, angles=table)
+    np.testing.assert_allclose(file["theta_i"].values, [10.0, 20.0])
+    np.testing.assert_allclose(file["reference_angle"].values, [0.0, 20.0])
+    assert file["theta_i"].attrs["units"] == "degree"
+
+
+def test_another_extension(tmp_path, frames):
+    with pytest.raises(DataError, match=r"written as \.nc or \.zarr"):
+        MapWriter(tmp_path / "stokes.tif", frames, Instrument(lcvr(retardance_set("tetrahedron")), DETECTOR))

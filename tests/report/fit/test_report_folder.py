@@ -1,0 +1,129 @@
+import json
+import math
+from dataclasses import asdict
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import pbrdf
+from pbrdf.errors import DataError
+from pbrdf.report.fit import folder as module
+from pbrdf.report.fit.folder import (
+    comparison_file,
+    complete_folder,
+    fit_record,
+    require_writable,
+    write_report,
+)
+
+NAMES = {"summary.txt", "figure.png", "model.json", "fit.json", "comparison.nc", "starts.png"}
+
+
+@pytest.fixture(scope="module")
+def folder(report, tmp_path_factory):
+    """The report written once."""
+    target = tmp_path_factory.mktemp("report") / "fit"
+    written = write_report(report, target)
+    assert {path.name for path in written} == NAMES
+    return target
+
+
+def test_the_folder_holds_everything_and_nothing_else(folder):
+    assert {path.name for path in folder.iterdir()} == NAMES
+    assert [path.name for path in folder.parent.iterdir()] == ["fit"]
+
+
+def test_the_model_reads_back(folder, report):
+    assert pbrdf.load_model(folder / "model.json") == report.result.model
+
+
+def test_the_record_has_the_numbers_of_the_result(folder, report):
+    text = (folder / "fit.json").read_text(encoding="utf-8")
+    assert "NaN" not in text
+    record = json.loads(text)
+    result = report.result
+    assert record == fit_record(report)
+    for name, estimate in result.estimates.items():
+        stored = record["estimates"][name]
+        assert stored["value"] == estimate.value
+        assert stored["standard_error"] == (None if math.isnan(estimate.std) else estimate.std)
+        assert stored["verdict"] == estimate.verdict
+    assert record["correlation"]["matrix"] == result.correlation.values.tolist()
+    assert record["goodness"]["chi2"] == result.goodness.chi2
+    assert record["optima"][0] == asdict(result.optima[0])
+    assert record["predicted_errors"]["off-specular"] == asdict(result.predicted["off-specular"])
+    assert record["hold_out"] == "group=3"
+    assert record["data"]["held_out_geometries"] == 21
+    assert record["settings"]["starts"] == 8
+    assert record["uncertainties_from_data"] is True
+
+
+def test_the_comparison_is_in_degrees_and_explains_itself(folder, report):
+    with xr.open_dataset(folder / "comparison.nc", engine="h5netcdf") as stored:
+        expected = report.result.comparison
+        for name in ("theta_i", "theta_r", "phi", "facet_tilt"):
+            assert stored[name].attrs["units"] == "degree"
+            np.testing.assert_allclose(np.deg2rad(stored[name].values), expected[name].values, atol=1e-12)
+        np.testing.assert_array_equal(stored["I_residual"], stored["I_modelled"] - stored["I_measured"])
+        np.testing.assert_array_equal(stored["held_out"].values.astype(bool), expected["held_out"].values)
+        assert stored.attrs["hold_out"] == "group=3"
+        assert pbrdf.load_model(json.loads(stored.attrs["model"])) == report.result.model
+        assert pbrdf.__version__ in stored.attrs["source"]
+
+
+def test_the_comparison_leaves_the_result_alone(report):
+    before = report.result.comparison.copy(deep=True)
+    comparison_file(report)
+    xr.testing.assert_identical(report.result.comparison, before)
+
+
+def test_other_files_of_a_folder_are_left_alone(report, tmp_path):
+    (tmp_path / "notes.txt").write_text("mine")
+    (tmp_path / "fit.json").write_text("old")
+    write_report(report, tmp_path, figure_format="svg")
+    assert (tmp_path / "notes.txt").read_text() == "mine"
+    assert json.loads((tmp_path / "fit.json").read_text())["hold_out"] == "group=3"
+    assert (tmp_path / "figure.svg").read_text().startswith("<?xml")
+
+
+def test_a_failure_leaves_nothing_behind(report, tmp_path, monkeypatch):
+    def fail(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(module, "comparison_file", fail)
+    with pytest.raises(DataError, match="fit: cannot be written: No space left"):
+        write_report(report, tmp_path / "fit")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_is_tried_without_a_trace(tmp_path):
+    require_writable(tmp_path / "a" / "b" / "fit")
+    assert list(tmp_path.iterdir()) == []
+    (tmp_path / "file").write_text("")
+    with pytest.raises(DataError, match="there is a file of that name"):
+        require_writable(tmp_path / "file")
+    with pytest.raises(DataError, match="cannot be written"):
+        require_writable(tmp_path / "file" / "fit")
+
+
+def test_a_folder_that_is_there_is_filled_but_a_zarr_store_in_it_is_replaced_as_a_whole(tmp_path):
+    """Pieces of an old store among those of the new one would be read as data."""
+    for name, text in (
+        ("figures/mine.txt", "mine"),
+        ("figures/a.txt", "old"),
+        ("maps.zarr/c/9", "old piece"),
+    ):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    with complete_folder(tmp_path) as folder:
+        for name in ("figures/a.txt", "maps.zarr/c/0", "summary.txt"):
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            (folder / name).write_text("new")
+    found = {str(p.relative_to(tmp_path)): p.read_text() for p in tmp_path.rglob("*") if p.is_file()}
+    assert found == {
+        "figures/mine.txt": "mine",
+        "figures/a.txt": "new",
+        "maps.zarr/c/0": "new",
+        "summary.txt": "new",
+    }
