@@ -26,12 +26,12 @@ if TYPE_CHECKING:
         NoiseModel,
         Nuisance,
         cross_validate,
-        directional_hemispherical_reflectance,
         error_analysis,
         fit,
         plausibility,
     )
     from pbrdf.models import DoubleGauss, Model, ReciprocalDoubleGauss, load_model
+    from pbrdf.models.reflectance import directional_hemispherical_reflectance
     from pbrdf.optics.mueller import coherency_eigenvalues
     from pbrdf.optics.stokes import aolp, docp, dolp, dop
 
@@ -46,12 +46,12 @@ _HOME = {
         "NoiseModel",
         "Nuisance",
         "cross_validate",
-        "directional_hemispherical_reflectance",
         "error_analysis",
         "fit",
         "plausibility",
     ),
     "pbrdf.models": ("DoubleGauss", "Model", "ReciprocalDoubleGauss", "load_model"),
+    "pbrdf.models.reflectance": ("directional_hemispherical_reflectance",),
     "pbrdf.optics.mueller": ("coherency_eigenvalues",),
     "pbrdf.optics.stokes": ("aolp", "docp", "dolp", "dop"),
 }

@@ -10,7 +10,7 @@ from scipy.optimize import least_squares
 
 import pbrdf
 from pbrdf.errors import FitError
-from pbrdf.inversion.fit import compare
+from pbrdf.inversion.comparison import compare
 from pbrdf.inversion.observations import Observations
 from pbrdf.inversion.problem import Space
 

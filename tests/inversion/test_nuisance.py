@@ -128,7 +128,7 @@ def test_an_extended_source_is_the_average_over_its_disc():
             {n: float(v) for n, v in specular_only.values.items()},
             np.array([0.0]),
             np.array([1.0]),
-            (Term("source"),),
+            (Term("source", nuisance=True),),
         )
         data = Observations(
             *(np.array([v]) for v in (ti, tr, 0.0)),
@@ -153,7 +153,7 @@ def test_radius_of_the_source_is_found_and_sigma_with_it():
         {n: float(v) for n, v in MODEL.values.items()},
         np.array([0.0]),
         np.array([1.0]),
-        (Term("source"),),
+        (Term("source", nuisance=True),),
     )
     empty = dataset(np.ones((len(theta_i), 4)), theta_i, theta_r, group)
     signal = predict(space, np.array([math.radians(4.0)]), Observations.from_dataset(empty), "IQUV")

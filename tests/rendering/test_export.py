@@ -12,7 +12,7 @@ from pbrdf.data.formats.pbsdf import read_table
 from pbrdf.errors import DataError, ModelError
 from pbrdf.optics.half_difference import directions
 from pbrdf.rendering.export import AIMS, UNSTATED_WAVELENGTH, grid_dataset, write_merl, write_pbsdf
-from pbrdf.rendering.tabulation import lobe_width, random_directions, refined_table
+from pbrdf.rendering.tabulation import random_directions, refined_table
 
 ROUGH = pbrdf.DoubleGauss(sigma=0.08, n=1.6, a=0.8, k=1.3, b=0.3, t=0.6)
 GLOSSY = ROUGH.replace(sigma=0.05)
@@ -67,11 +67,6 @@ def test_the_random_geometries_are_what_they_are_said_to_be():
     assert max(a.max() for region in sample.values() for a in region[:2]) <= np.deg2rad(80)
 
 
-@pytest.mark.parametrize("sigma", [0.002, 0.03, 0.1])
-def test_the_width_of_the_lobe_is_found_without_the_parameters(sigma):
-    assert lobe_width(ROUGH.replace(sigma=sigma)) == pytest.approx(sigma, rel=0.03)
-
-
 def test_nodes_crowd_where_the_lobe_is(coarse):
     """Even in a coarse table a step of θ_h within the lobe is less than σ, and φ_d spans the whole turn."""
     table = read_table(coarse.path)
@@ -98,7 +93,7 @@ def test_interpolation_is_as_good_as_reported(coarse):
     assert coarse.accurate
     assert [e.region for e in coarse.errors] == ["hemisphere", "lobe", "both"]
     reported = {e.region: e for e in coarse.errors}
-    for region, geometry in random_directions(lobe_width(METAL), 5_000, seed=8).items():
+    for region, geometry in random_directions(METAL.lobe_width(), 5_000, seed=8).items():
         off = [
             share_of_f00(coarse.table.mueller(*geometry, which), model.mueller(*geometry))
             for which, model in enumerate((METAL.replace(a=0.1), METAL))

@@ -179,7 +179,7 @@ def _warn_of_gain(source: str, model: Model) -> None:
     """Say so if a paint gives off more light than it gets: its amplitude is on a camera's scale, not on a BRDF's."""
     import numpy as np
 
-    from pbrdf.inversion.plausibility import directional_hemispherical_reflectance
+    from pbrdf.models.reflectance import directional_hemispherical_reflectance
 
     if any(np.ndim(value) for value in model.values.values()):
         return

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from pbrdf.inversion.crossvalidation import cross_validate
 from pbrdf.inversion.erroranalysis import error_analysis
-from pbrdf.inversion.fit import Estimate, FitResult, Optimum, fit
+from pbrdf.inversion.estimates import DistinctOptimum, Estimate
+from pbrdf.inversion.fit import fit
 from pbrdf.inversion.holdout import HoldOut, Prediction
 from pbrdf.inversion.noise import EqualNoise, InstrumentNoise, NoiseModel
 from pbrdf.inversion.nuisance import Nuisance
 from pbrdf.inversion.observations import Observations
-from pbrdf.inversion.plausibility import directional_hemispherical_reflectance, plausibility
+from pbrdf.inversion.optimum import Optimum
+from pbrdf.inversion.plausibility import plausibility
+from pbrdf.inversion.result import FitResult
 
 __all__ = [
+    "DistinctOptimum",
     "EqualNoise",
     "Estimate",
     "FitResult",
@@ -23,7 +27,6 @@ __all__ = [
     "Optimum",
     "Prediction",
     "cross_validate",
-    "directional_hemispherical_reflectance",
     "error_analysis",
     "fit",
     "plausibility",

@@ -11,13 +11,13 @@ import numpy as np
 
 from pbrdf.errors import FitError
 from pbrdf.inversion.observations import Observations
+from pbrdf.inversion.optimum import Optimum
 from pbrdf.inversion.problem import predict, residuals
 from pbrdf.inversion.solver import Status, solve
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pbrdf.inversion.fit import FitResult
 
 __all__ = ["Bootstrap", "bootstrap", "simulate"]
 
@@ -60,7 +60,7 @@ class Bootstrap:
 
 
 def bootstrap(
-    result: FitResult,
+    result: Optimum,
     count: int = 200,
     *,
     seed: int = 0,

@@ -15,10 +15,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pbrdf.errors import FitError
-from pbrdf.inversion.fit import FitResult, compare, fit
+from pbrdf.inversion.comparison import compare
+from pbrdf.inversion.fit import fit
 from pbrdf.inversion.holdout import Prediction, prediction_errors
 from pbrdf.inversion.observations import Observations
 from pbrdf.inversion.problem import Space, residuals
+from pbrdf.inversion.result import FitResult
 from pbrdf.inversion.solver import Solution, Status, solve
 from pbrdf.models import DoubleGauss, Model
 

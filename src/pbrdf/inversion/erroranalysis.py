@@ -15,10 +15,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pbrdf.inversion.optimum import Optimum
+
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pbrdf.inversion.fit import FitResult
 
 __all__ = [
     "ErrorAnalysis",
@@ -199,7 +200,7 @@ class ErrorAnalysis:
         return lines
 
 
-def error_analysis(result: FitResult) -> ErrorAnalysis:
+def error_analysis(result: Optimum) -> ErrorAnalysis:
     """Errors of a fit against angle: standard deviation, maximum, strongest points, structure.
 
     Points without a measured intensity count in no error of the intensity, points without polarisation in none of

@@ -11,8 +11,9 @@ from typing import Any
 
 import drjit as dr
 
+from pbrdf.models.arrays import is_zero, weighted_sum
 from pbrdf.models.base import Model
-from pbrdf.models.evaluation import horizon_guard, is_zero, weighted_sum
+from pbrdf.models.evaluation import horizon_guard
 from pbrdf.models.extended_source import kernel_under_disc
 from pbrdf.optics.geometry import geometry_from_angles
 
@@ -20,7 +21,12 @@ __all__ = ["channel_values", "measured_mueller"]
 
 
 def measured_mueller(
-    model: Model, roles: Mapping[str, Any], theta_i: Any, theta_r: Any, phi: Any
+    model: Model,
+    values: Mapping[str, Any],
+    nuisances: Mapping[str, Any],
+    theta_i: Any,
+    theta_r: Any,
+    phi: Any,
 ) -> tuple[list[list[Any]], Any]:
     """Mueller matrix that the instrument sees, without gain and dark offset.
 
@@ -28,8 +34,10 @@ def measured_mueller(
     ----------
     model
         Whose kernel and options are used.
-    roles
-        Values of the model's parameters, and of ``angle`` and ``source`` (radians) where the fit has them.
+    values
+        Parameters of the model by name.
+    nuisances
+        Values of ``angle`` and ``source`` (radians) where the fit has them.
     theta_i, theta_r, phi
         Nominal angles in radians.
 
@@ -39,21 +47,21 @@ def measured_mueller(
         Nested lists of floats, 0 at and below the horizon; and everything else that was traced, to be kept
         until derivatives have been propagated.
     """
-    if "angle" in roles:
+    if "angle" in nuisances:
         # in the plane of incidence: θ_r with the sign of cosφ, both angles turn against each other
-        signed = theta_r * dr.sign(dr.cos(phi)) - roles["angle"]
-        theta_i = theta_i + roles["angle"]
+        signed = theta_r * dr.sign(dr.cos(phi)) - nuisances["angle"]
+        theta_i = theta_i + nuisances["angle"]
         # beyond the normal the source would change sides; the turn of both azimuths is one half-turn of φ
         flip = (signed < 0.0) ^ (theta_i < 0.0)
         theta_r, theta_i = dr.abs(signed), dr.abs(theta_i)
         phi = dr.select(flip, math.pi, 0.0)
     theta_i, theta_r, visible = horizon_guard(theta_i, theta_r)
     geometry = geometry_from_angles(theta_i, theta_r, phi)
-    if "source" not in roles:
-        f = model.kernel(geometry, roles, "total")
+    if "source" not in nuisances:
+        f = model.kernel(geometry, values, "total")
         alive: Any = f
     else:
-        f, alive = kernel_under_disc(model, geometry, roles, roles["source"])
+        f, alive = kernel_under_disc(model, geometry, values, nuisances["source"])
     return [[_masked(visible, x) for x in row] for row in f], alive
 
 

@@ -22,13 +22,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pbrdf.errors import FitError
+from pbrdf.inversion.optimum import Optimum
 from pbrdf.inversion.profile import Optima
 from pbrdf.inversion.statistics import covariance, prior_spread
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pbrdf.inversion.fit import FitResult
 
 __all__ = ["Combination", "Identifiability", "identifiability"]
 
@@ -107,7 +107,7 @@ class Identifiability:
         return found
 
 
-def identifiability(result: FitResult) -> Identifiability:
+def identifiability(result: Optimum) -> Identifiability:
     """Name the combinations of parameters that the data of a fit do not determine.
 
     Parameters

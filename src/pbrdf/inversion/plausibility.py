@@ -13,29 +13,18 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from pbrdf.errors import ModelError
+from pbrdf.inversion.optimum import Optimum
 from pbrdf.models.base import Model
-from pbrdf.optics.mueller import coherency_eigenvalues
+from pbrdf.models.realisability import least_coherency
+from pbrdf.models.reflectance import directional_hemispherical_reflectance
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pbrdf.inversion.fit import FitResult
 
-__all__ = [
-    "Finding",
-    "Severity",
-    "directional_hemispherical_reflectance",
-    "least_coherency",
-    "plausibility",
-]
+__all__ = ["Finding", "Severity", "plausibility"]
 
-#: Nodes of the specular integral: radius, in standard deviations of slope, up to REACH, and direction.
-RADII, DIRECTIONS, REACH = 128, 96, 8.0
-#: Nodes of the diffuse integral: √cosθ_r and azimuth.
-ZENITHS, AZIMUTHS = 64, 32
 #: Incidence angles at which the energy balance of a fit is checked, degrees.
 INCIDENCES = tuple(range(0, 86, 5))
 #: Directional-hemispherical reflectances up to this much above 1 count as 1: the accuracy of the integral.
@@ -75,7 +64,7 @@ class Finding:
     sentence: str
 
 
-def plausibility(result: FitResult, dataset: xr.Dataset | None = None) -> list[Finding]:
+def plausibility(result: Optimum, dataset: xr.Dataset | None = None) -> list[Finding]:
     """Check a fit for what no residual shows.
 
     Parameters
@@ -101,108 +90,12 @@ def plausibility(result: FitResult, dataset: xr.Dataset | None = None) -> list[F
     ]
 
 
-def directional_hemispherical_reflectance(model: Model, theta_i: ArrayLike) -> np.ndarray:
-    """Share of natural light from one direction that a surface reflects into the hemisphere.
-
-    DHR(θ_i) = ∫ f00 cosθ_r dω_r. The specular part is integrated over the facet slopes, in which its lobe is a
-    Gaussian of width σ whatever σ and θ_i are; the diffuse part over the direction of view, with nodes that
-    crowd towards grazing, where cosθ_r^(k−1) is singular for k < 1.
-
-    Parameters
-    ----------
-    model
-        A model of single parameters (no maps) with a slope standard deviation ``sigma``.
-    theta_i
-        Zenith angles of the source in radians, within [0, π/2); any shape.
-
-    Returns
-    -------
-    ndarray
-        Dimensionless, of the shape of ``theta_i``. Accurate to 1e-3, and to 1e-6 where horizon and shadowing do not
-        cut into the lobe (σ ≤ 0.1 and θ_i ≤ 60°).
-
-    Raises
-    ------
-    ModelError
-        If an angle is out of range or the model's parameters are arrays.
-    """
-    angles = np.asarray(theta_i, dtype=float)
-    if not ((angles >= 0.0) & (angles < 0.5 * math.pi)).all():
-        raise ModelError(
-            "theta_i must be within [0, π/2) radians for a directional-hemispherical reflectance"
-        )
-    if any(np.ndim(value) for value in model.values.values()):
-        raise ModelError(
-            "the directional-hemispherical reflectance needs a model of single parameters, no maps"
-        )
-    flat = angles.ravel()
-    return (_specular_reflectance(model, flat) + _diffuse_reflectance(model, flat)).reshape(angles.shape)
-
-
-def _specular_reflectance(model: Model, theta_i: np.ndarray) -> np.ndarray:
-    """∫ f_mf cosθ_r dω_r over the facets m: dω_r = 4 cosβ dω_m, dω_m = cos³θ dx dy of the slopes; shape (N,)."""
-    sigma = float(model.values["sigma"])
-    node, weight = np.polynomial.legendre.leggauss(RADII)
-    radius = 0.5 * REACH * (node + 1.0)
-    # the half plane y > 0, counted twice: f00 is even in φ
-    direction = (np.arange(DIRECTIONS) + 0.5) * math.pi / DIRECTIONS
-    slope_x = sigma * radius[:, None] * np.cos(direction)
-    slope_y = sigma * radius[:, None] * np.sin(direction)
-    area = sigma**2 * (0.5 * REACH * weight * radius)[:, None] * (2.0 * math.pi / DIRECTIONS)
-    cos_m = 1.0 / np.sqrt(1.0 + slope_x**2 + slope_y**2)
-    m = np.stack([slope_x * cos_m, slope_y * cos_m, cos_m])
-    incident = np.stack([-np.sin(theta_i), np.zeros_like(theta_i), np.cos(theta_i)], -1)
-    cos_beta = np.einsum("ni,ixy->nxy", incident, m)
-    r = 2.0 * cos_beta[:, None] * m - incident[:, :, None, None]
-    seen = (cos_beta > 0.0) & (r[:, 2] > 0.0)
-    theta_r = np.where(seen, np.arctan2(np.hypot(r[:, 0], r[:, 1]), r[:, 2]), 0.0)
-    phi = np.where(seen, np.arctan2(r[:, 1], r[:, 0]), 0.0)
-    f = model.stokes(theta_i[:, None, None], theta_r, phi, part="specular")[..., 0]
-    return np.where(seen, f * r[:, 2] * 4.0 * cos_beta * cos_m**3 * area, 0.0).sum((1, 2))
-
-
-def _diffuse_reflectance(model: Model, theta_i: np.ndarray) -> np.ndarray:
-    """∫ f_vol cosθ_r dω_r with cosθ_r = s², which tames the singularity of cosθ_r^(k−1); shape (N,)."""
-    node, weight = np.polynomial.legendre.leggauss(ZENITHS)
-    s = 0.5 * (node + 1.0)
-    cos_r = s * s
-    solid_angle = (0.5 * weight * 2.0 * s)[:, None] * (2.0 * math.pi / AZIMUTHS)  # both halves of the azimuth
-    phi = (np.arange(AZIMUTHS) + 0.5) * math.pi / AZIMUTHS
-    f = model.stokes(theta_i[:, None, None], np.arccos(cos_r)[:, None], phi, part="diffuse")[..., 0]
-    return (f * cos_r[:, None] * solid_angle).sum((1, 2))
-
-
-def least_coherency(model: Model) -> tuple[float, tuple[float, float, float]]:
-    """Smallest eigenvalue of Cloude's coherency matrix over a grid of directions.
-
-    Parameters
-    ----------
-    model
-        The model.
-
-    Returns
-    -------
-    tuple
-        The eigenvalue in units of f00 (negative beyond rounding: no passive surface has this Mueller matrix), and
-        (θ_i, θ_r, φ) in radians where it stands. The grid holds zenith angles of 0° to 80° by 10° and 89° and
-        azimuths of 0° to 180° by 15°, mirror and backscatter directions among them.
-    """
-    zenith = np.deg2rad([*range(0, 81, 10), 89])
-    angles = np.meshgrid(zenith, zenith, np.deg2rad(np.arange(0, 181, 15)), indexing="ij")
-    flat = [a.ravel() for a in angles]
-    f = np.asarray(model.mueller(*flat))
-    f00 = f[:, :1, :1]
-    least = coherency_eigenvalues(f / np.where(f00 > 0.0, f00, 1.0))[:, 0]
-    worst = int(np.argmin(least))
-    return float(least[worst]), (float(flat[0][worst]), float(flat[1][worst]), float(flat[2][worst]))
-
-
-def _energy(result: FitResult, attributes: dict[Any, Any]) -> Finding:
+def _energy(result: Optimum, attributes: dict[Any, Any]) -> Finding:
     incidence = np.deg2rad(INCIDENCES)
     reflectance = directional_hemispherical_reflectance(result.model, incidence)
     worst = int(np.argmax(reflectance))
     largest = f"The model reflects at most {reflectance[worst]:.3g} of natural light (at θ_i = {INCIDENCES[worst]}°)"
-    gain = any(term.role == "gain" for term in result.space.terms)
+    gain = any(term.nuisance and term.role == "gain" for term in result.space.terms)
     unknown = _unknown_scale(attributes)
     if unknown and not gain:
         sentence = f"{largest}, which says nothing about energy: {unknown}."
@@ -251,7 +144,7 @@ def _realisability(model: Model) -> Finding:
     return Finding("realisability", Severity.VIOLATION, sentence)
 
 
-def _parameters(result: FitResult) -> list[Finding]:
+def _parameters(result: Optimum) -> list[Finding]:
     findings = []
     for name, estimate in result.estimates.items():
         if estimate.verdict.startswith("at "):
@@ -269,27 +162,29 @@ def _parameters(result: FitResult) -> list[Finding]:
     return findings
 
 
-def _lobe(result: FitResult) -> Finding:
-    """Whether the specular lobe was measured: its height carries n, its width σ."""
-    sigma = float(result.model.values["sigma"])
+def _lobe(result: Optimum) -> Finding:
+    """Whether the specular lobe was measured: its height and width carry the parameters of the facets."""
+    slope = float(result.model.lobe_width())
     tilt = _tilt(result)[_used(result)]
-    count = int((np.tan(tilt) <= LOBE_WIDTHS * sigma).sum())
-    width = np.rad2deg(math.atan(LOBE_WIDTHS * sigma))
+    count = int((np.tan(tilt) <= LOBE_WIDTHS * slope).sum())
+    width = np.rad2deg(math.atan(LOBE_WIDTHS * slope))
+    shaping = [p.symbol for p in result.model.parameters if p.fitted and p.part == "specular"]
+    rest = f"{' and '.join(shaping) or 'the parameters of the lobe'} rest{'s' if len(shaping) == 1 else ''}"
     near = f"{LOBE_WIDTHS:g}σ ({width:.2g}° of facet tilt) of the mirror direction"
     if count == 0:
         sentence = (
-            f"No fitted point lies within {near}: σ and n rest on the tail of the lobe or on the diffuse part, and "
+            f"No fitted point lies within {near}: {rest} on the tail of the lobe or on the diffuse part, and "
             "the predicted peak is extrapolation."
         )
         return Finding("lobe", Severity.WARNING, sentence)
     if count < LOBE_POINTS:
         noun, verb = ("point", "lies") if count == 1 else ("points", "lie")
-        sentence = f"Only {count} fitted {noun} {verb} within {near}: σ and n rest on them."
+        sentence = f"Only {count} fitted {noun} {verb} within {near}: {rest} on them."
         return Finding("lobe", Severity.WARNING, sentence)
     return Finding("lobe", Severity.OK, f"The lobe was measured: {count} fitted points lie within {near}.")
 
 
-def _range(result: FitResult) -> list[Finding]:
+def _range(result: Optimum) -> list[Finding]:
     data, used = result.data, _used(result)
     ranges = {
         "θ_i": np.rad2deg(data.theta_i[used]),
@@ -330,11 +225,11 @@ def _range(result: FitResult) -> list[Finding]:
     return findings
 
 
-def _used(result: FitResult) -> np.ndarray:
+def _used(result: Optimum) -> np.ndarray:
     """Geometries of the fitted data with at least one measured value, shape (G,)."""
     return np.isfinite(result.data.std).any(axis=0)
 
 
-def _tilt(result: FitResult) -> np.ndarray:
+def _tilt(result: Optimum) -> np.ndarray:
     """Tilt of the mirror facet at the fitted geometries in radians, shape (G,)."""
     return result.comparison["facet_tilt"].values[~result.comparison["held_out"].values]

@@ -27,6 +27,8 @@ class Term:
     ----------
     role
         Parameter of the model, or kind of nuisance, whose value it is.
+    nuisance
+        Whether it is a kind of nuisance.
     split
         ``"group"`` or ``"wavelength"`` if it counts for some geometries only; else None.
     label
@@ -39,6 +41,7 @@ class Term:
     split: str | None = None
     label: Any = None
     prior: tuple[float, float] | None = None
+    nuisance: bool = False
 
 
 @dataclass(frozen=True)
@@ -120,14 +123,9 @@ class Space:
         """
         named: dict[str, float] = {}
         for term, value in zip(self.terms, values, strict=True):
-            if term.role in self.model_names and (term.role not in named or term.label == label):
+            if not term.nuisance and (term.role not in named or term.label == label):
                 named[term.role] = float(value)
         return self.model.from_values({**self.fixed, **named}, **self.options)
-
-    @property
-    def model_names(self) -> list[str]:
-        """Names of the model's parameters."""
-        return [p.name for p in self.model.parameters]
 
     def labels(self, split: str) -> list[Any]:
         """The groups or wavelengths that have unknowns of their own."""
@@ -294,9 +292,9 @@ class _Signals:
         self.Float, self.UInt32 = backend.Float, backend.UInt32
         self.space, self.incident = space, data[0].illumination
         model = space.build(space.lower)  # only its kernel and options are used
-        self.model = model if accuracy is None else model.replace(accuracy=accuracy)
+        self.model = model if accuracy is None else model.with_accuracy(accuracy)
         self.fixed = {name: dr.opaque(self.Float, value) for name, value in space.fixed.items()}
-        self.dielectric = space.fixed.get("kappa") == 0.0
+        self.absent = [p.name for p in model.parameters if p.vanishing and space.fixed.get(p.name) == 0.0]
         first = data[0]
         size = len(first.theta_i)
         names = ("theta_i", "theta_r", "phi")
@@ -308,11 +306,11 @@ class _Signals:
             return backend.upload(self.Float, np.concatenate(arrays))
 
         self.angles = [upload(name) for name in names]
-        roles = {term.role for term in space.terms}
-        if "angle" in roles and any((np.abs(np.sin(o.phi)) > 1e-6).any() for o in data):
+        nuisances = {term.role for term in space.terms if term.nuisance}
+        if "angle" in nuisances and any((np.abs(np.sin(o.phi)) > 1e-6).any() for o in data):
             raise FitError("nuisance angle: it needs data in the plane of incidence (phi 0° or 180°)")
         self.scale = None
-        if "dark" in roles:
+        if "dark" in nuisances:
             scale = np.ones(size) if first.scale is None else first.scale
             self.scale = backend.upload(self.Float, scale)
         self.label_index = {
@@ -326,30 +324,35 @@ class _Signals:
     ) -> tuple[list[Any], Any]:
         import drjit as dr
 
-        roles: dict[str, Any] = dict(self.fixed)
-        shared: dict[str, list[Any]] = {}
+        values: dict[str, Any] = dict(self.fixed)
+        nuisances: dict[str, Any] = {}
+        shared: dict[tuple[bool, str], list[Any]] = {}
         for term, unknown in zip(self.space.terms, u, strict=True):
-            shared.setdefault(term.role, []).append(unknown)
+            shared.setdefault((term.nuisance, term.role), []).append(unknown)
         logarithmic = {
-            term.role: p.logarithmic for term, p in zip(self.space.terms, self.space.free, strict=True)
+            (term.nuisance, term.role): p.logarithmic
+            for term, p in zip(self.space.terms, self.space.free, strict=True)
         }
-        for role, unknowns in shared.items():
+        for (nuisance, role), unknowns in shared.items():
             # a group or wavelength without an unknown of its own (held out) gets the mean of the others
             mean = sum(unknowns[1:], unknowns[0]) / len(unknowns) if len(unknowns) > 1 else unknowns[0]
-            roles[role] = dr.exp(mean) if logarithmic[role] else mean
+            target = nuisances if nuisance else values
+            target[role] = dr.exp(mean) if logarithmic[nuisance, role] else mean
         for term, unknown in zip(self.space.terms, u, strict=True):
             if term.split is not None:
-                value = dr.exp(unknown) if logarithmic[term.role] else unknown
+                value = dr.exp(unknown) if logarithmic[term.nuisance, term.role] else unknown
                 index = dr.gather(self.UInt32, self.label_index[term.split], point)
                 chosen = index == self.space.labels(term.split).index(term.label)
-                roles[term.role] = dr.select(chosen, value, roles[term.role])
-        if self.dielectric:
-            roles["kappa"] = None
+                target = nuisances if term.nuisance else values
+                target[term.role] = dr.select(chosen, value, target[term.role])
+        values |= dict.fromkeys(self.absent)
         at = number * self.stride + point
         theta_i, theta_r, phi = (dr.gather(self.Float, a, at) for a in self.angles)
-        f, alive = measured_mueller(self.model, roles, theta_i, theta_r, phi)
-        dark = roles["dark"] * dr.gather(self.Float, self.scale, point) if "dark" in roles else None
-        return channel_values(f, channels, self.incident, roles.get("gain"), dark), (alive, f)
+        f, alive = measured_mueller(self.model, values, nuisances, theta_i, theta_r, phi)
+        dark = None
+        if "dark" in nuisances:
+            dark = nuisances["dark"] * dr.gather(self.Float, self.scale, point)
+        return channel_values(f, channels, self.incident, nuisances.get("gain"), dark), (alive, f)
 
 
 def _label_index(data: Observations, split: str, labels: list[Any]) -> np.ndarray:

@@ -17,6 +17,7 @@ import numpy as np
 
 from pbrdf.errors import FitError
 from pbrdf.inversion.observations import Observations
+from pbrdf.inversion.optimum import Optimum
 from pbrdf.inversion.problem import Space, residuals
 from pbrdf.inversion.solver import Solution, Status, solve
 from pbrdf.inversion.statistics import covariance, prior_spread
@@ -24,7 +25,6 @@ from pbrdf.inversion.statistics import covariance, prior_spread
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pbrdf.inversion.fit import FitResult
 
 __all__ = ["Contour", "Interval", "Optima", "Profile", "contour", "interval_ends", "profile", "rise_of_chi2"]
 
@@ -132,7 +132,7 @@ class Contour:
 
 
 def profile(
-    result: FitResult, names: Sequence[str] | None = None, *, level: float = 0.95, points: int = 31
+    result: Optimum, names: Sequence[str] | None = None, *, level: float = 0.95, points: int = 31
 ) -> Profile:
     """Profile-likelihood intervals of free parameters.
 
@@ -241,7 +241,7 @@ def profile(
 
 
 def contour(
-    result: FitResult, a: str, b: str, *, levels: Sequence[float] = (0.68, 0.95), points: int = 41
+    result: Optimum, a: str, b: str, *, levels: Sequence[float] = (0.68, 0.95), points: int = 41
 ) -> Contour:
     """Joint confidence regions of two parameters, the others refitted at every point of a grid.
 
@@ -309,7 +309,7 @@ def contour(
     return Contour(a, b, rises, dataset, better, better_chi2, notes)
 
 
-def rise_of_chi2(result: FitResult, level: float, parameters: int) -> float:
+def rise_of_chi2(result: Optimum, level: float, parameters: int) -> float:
     """How far χ² may rise above its minimum inside a confidence region.
 
     With known uncertainties the quantile of χ² with as many degrees of freedom as parameters are looked at (3.84
@@ -421,7 +421,7 @@ class Optima:
     error: np.ndarray
 
     @classmethod
-    def of(cls, result: FitResult) -> Optima:
+    def of(cls, result: Optimum) -> Optima:
         """The optimum of a fit."""
         return cls.at(result.space, [result.data], result.unknowns[None], result.information[None])
 

@@ -1,10 +1,11 @@
 """How the search runs: all parameters together, or step by step as the paper does.
 
-Stepwise (paper, section 2.2): the diffuse parameters a, k, b, t from the geometries where the specular lobe is
-negligible, with σ and n held; then σ and n from all geometries, with the diffuse parameters held. The
-paper does not say where it holds σ and n in the first step: here σ comes from a wide first guess that is
-replaced by the fitted one until the choice of geometries no longer changes, and n from the parameter's
-default, then from the second step. Beyond the paper, an optional last step polishes all parameters together.
+Stepwise (paper, section 2.2): the parameters of the diffuse part (the paper's a, k, b, t) from the geometries where
+the specular lobe is negligible, with the others (σ and n) held; then the others from all geometries, with the diffuse
+ones held. The paper does not say where it holds σ and n in the first step: here the width of the lobe comes from a wide
+first guess that is replaced by the fitted one until the choice of geometries no longer changes, and the rest from the
+parameters' defaults, then from the second step. Beyond the paper, an optional last step polishes all parameters
+together.
 """
 
 from __future__ import annotations
@@ -19,16 +20,15 @@ from pbrdf.inversion.clusters import cluster
 from pbrdf.inversion.observations import Observations
 from pbrdf.inversion.problem import Space, residuals
 from pbrdf.inversion.solver import Solution, solve
+from pbrdf.optics.half_difference import facet_tilt
 
-__all__ = ["STRATEGIES", "Stage", "facet_tilt", "joint", "stepwise"]
+__all__ = ["STRATEGIES", "Stage", "joint", "stepwise"]
 
 STRATEGIES = ("joint", "stepwise")
-#: Parameters of the diffuse and of the specular step.
-DIFFUSE, SPECULAR = ("a", "k", "b", "t"), ("sigma", "n", "kappa")
-#: The lobe counts as negligible where the mirror facet is tilted by more than this many σ.
+#: The lobe counts as negligible where the mirror facet is tilted by more than this many of its slope widths.
 LOBE_WIDTH = 4.5
-#: First guess of σ for choosing geometries, and how often the choice is revised.
-WIDE_SIGMA, REVISIONS = 0.1, 4
+#: First guess of the width for choosing geometries, and how often the choice is revised.
+WIDE, REVISIONS = 0.1, 4
 
 Progress = Callable[[int, int], None] | None
 
@@ -57,13 +57,6 @@ class Stage:
     values: dict[str, float]
     points: int
     chi2: float
-
-
-def facet_tilt(theta_i: np.ndarray, theta_r: np.ndarray, phi: np.ndarray) -> np.ndarray:
-    """Tilt of the facet that mirrors source into viewer, radians; angles in radians, same shape."""
-    sin_i, sin_r = np.sin(theta_i), np.sin(theta_r)
-    across = np.hypot(sin_r * np.cos(phi) - sin_i, sin_r * np.sin(phi))
-    return np.arctan2(across, np.cos(theta_i) + np.cos(theta_r))
 
 
 def joint(
@@ -120,7 +113,7 @@ def stepwise(
     polish
         Whether all parameters are fitted together in the end.
     diffuse_tilt
-        Facet tilt in radians beyond which a geometry counts as diffuse; None chooses it from the running σ.
+        Facet tilt in radians beyond which a geometry counts as diffuse; None chooses it from the running width.
 
     Returns
     -------
@@ -135,42 +128,48 @@ def stepwise(
         few geometries lie outside the lobe.
     """
     names = space.names
-    diffuse_free = [n for n in names if n in DIFFUSE]
-    specular_free = [n for n in names if n not in DIFFUSE]
-    if any(
-        term.split == "wavelength" or (term.split and term.role in DIFFUSE + SPECULAR) for term in space.terms
-    ):
+    diffuse = [p.name for p in space.model.parameters if p.part == "diffuse"]
+    others = [p.name for p in space.model.parameters if p.part != "diffuse"]
+    is_diffuse = np.array([not term.nuisance and term.role in diffuse for term in space.terms])
+    diffuse_free = [n for n, chosen in zip(names, is_diffuse, strict=True) if chosen]
+    other_free = [n for n, chosen in zip(names, is_diffuse, strict=True) if not chosen]
+    if any(term.split == "wavelength" or (term.split and not term.nuisance) for term in space.terms):
         raise FitError(
             "stepwise: parameters of the model that are free for each group or wavelength need joint"
         )
-    if not diffuse_free or not any(n in SPECULAR for n in names):
-        raise FitError("stepwise: at least one of a, k, b, t and one of sigma, n, kappa must be free")
+    if not diffuse or not others:
+        raise FitError(
+            f"stepwise: every parameter of {space.model.name} shapes the same part: use the joint strategy"
+        )
+    if not diffuse_free or not any(not term.nuisance and term.role in others for term in space.terms):
+        raise FitError(
+            f"stepwise: at least one of {', '.join(diffuse)} and one of {', '.join(others)} must be free"
+        )
     low, high = space.box
-    is_diffuse = np.array([n in DIFFUSE for n in names])
     tilt = facet_tilt(data.theta_i, data.theta_r, data.phi)
 
-    # nuisance terms and n start the first step at their defaults, the diffuse parameters all over the bounds
+    # all but the diffuse parameters start the first step at their defaults, the diffuse ones all over the bounds
     u = first.copy()
     held = _held_values(space, first)
     u[:, ~is_diffuse] = held[~is_diffuse]
     stages: list[Stage] = []
-    diffuse = _choose(tilt, data, diffuse_tilt, WIDE_SIGMA, len(diffuse_free), shrink=True)
+    chosen = _choose(tilt, data, diffuse_tilt, WIDE, len(diffuse_free), shrink=True)
     for _ in range(REVISIONS):
-        part = _only(data, diffuse)
+        part = _only(data, chosen)
         one = _step(space, part, u, is_diffuse, low, high, max_iterations, progress)
         stages.append(_stage("diffuse", space, one, diffuse_free, part))
         u = one.u.copy()
         u[:, ~is_diffuse] = first[:, ~is_diffuse]
         two = _step(space, data, u, ~is_diffuse, low, high, max_iterations, progress)
-        stages.append(_stage("specular", space, two, specular_free, data))
+        stages.append(_stage("specular", space, two, other_free, data))
         best = space.to_parameters(two.u[int(np.nanargmin(two.cost))])
-        sigma = float(best[names.index("sigma")]) if "sigma" in names else space.fixed["sigma"]
-        revised = _choose(tilt, data, diffuse_tilt, sigma, len(diffuse_free), shrink=False)
+        width = float(space.build(best).lobe_width())
+        revised = _choose(tilt, data, diffuse_tilt, width, len(diffuse_free), shrink=False)
         u = two.u.copy()
         u[:, ~is_diffuse] = two.u[int(np.nanargmin(two.cost)), ~is_diffuse]
-        if (revised == diffuse).all():
+        if (revised == chosen).all():
             break
-        diffuse = revised
+        chosen = revised
     if polish:
         solution = _refine(space, data, two, low, high, max_iterations)
         stages.append(_stage("joint", space, solution, names, data))
@@ -178,7 +177,7 @@ def stepwise(
         # standard errors from all parameters together: those of one step alone would be too small
         final = solve(residuals(space, [data], len(two.u)), two.u, two.u, two.u, max_iterations=1)
         solution = replace(final, status=two.status)
-    return solution, stages, diffuse
+    return solution, stages, chosen
 
 
 def _held_values(space: Space, first: np.ndarray) -> np.ndarray:
@@ -193,16 +192,16 @@ def _held_values(space: Space, first: np.ndarray) -> np.ndarray:
 
 
 def _choose(
-    tilt: np.ndarray, data: Observations, override: float | None, sigma: float, free: int, shrink: bool
+    tilt: np.ndarray, data: Observations, override: float | None, width: float, free: int, shrink: bool
 ) -> np.ndarray:
-    """Geometries outside the lobe; with ``shrink`` the guess of σ is halved until enough are left."""
+    """Geometries outside the lobe; with ``shrink`` the guess of its width is halved until enough are left."""
     if override is not None:
         chosen = tilt > override
     else:
-        chosen = tilt > np.arctan(LOBE_WIDTH * sigma)
-        while shrink and _count(data, chosen) < 3 * free and sigma > 0.005:
-            sigma *= 0.5
-            chosen = tilt > np.arctan(LOBE_WIDTH * sigma)
+        chosen = tilt > np.arctan(LOBE_WIDTH * width)
+        while shrink and _count(data, chosen) < 3 * free and width > 0.005:
+            width *= 0.5
+            chosen = tilt > np.arctan(LOBE_WIDTH * width)
     if _count(data, chosen) <= free:
         raise FitError(
             f"stepwise: {_count(data, chosen)} values outside the specular lobe cannot determine {free} diffuse "

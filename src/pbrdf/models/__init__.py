@@ -2,11 +2,22 @@
 
 from __future__ import annotations
 
-from pbrdf.models.base import Model, load_model
+from pbrdf.models.base import Model
 from pbrdf.models.double_gauss import DoubleGauss, ReciprocalDoubleGauss
-from pbrdf.models.parameters import Parameter
+from pbrdf.models.parameters import Option, Parameter
+from pbrdf.models.registry import MODELS, find_model, load_model, register
 
-__all__ = ["MODELS", "DoubleGauss", "Model", "Parameter", "ReciprocalDoubleGauss", "load_model"]
+__all__ = [
+    "MODELS",
+    "DoubleGauss",
+    "Model",
+    "Option",
+    "Parameter",
+    "ReciprocalDoubleGauss",
+    "find_model",
+    "load_model",
+    "register",
+]
 
-#: Every model by the name that files and the command line use.
-MODELS: dict[str, type[Model]] = {model.name: model for model in (DoubleGauss, ReciprocalDoubleGauss)}
+register(DoubleGauss)
+register(ReciprocalDoubleGauss)

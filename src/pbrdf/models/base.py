@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import math
 import os
+import textwrap
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, Self
@@ -13,22 +15,29 @@ import numpy as np
 
 from pbrdf.errors import ModelError
 from pbrdf.models import evaluation
-from pbrdf.models.parameters import Parameter
+from pbrdf.models.arrays import Matrix, drjit_to_numpy, is_drjit, is_symbolic
+from pbrdf.models.lobe import measured_lobe_width
+from pbrdf.models.parameters import Option, Parameter
 from pbrdf.optics.geometry import Geometry
 
-__all__ = ["PARTS", "Model", "load_model"]
+__all__ = ["ACCURACIES", "PARTS", "Model"]
 
 #: Parts of a model that can be evaluated alone.
 PARTS = ("total", "specular", "diffuse")
-
-Matrix = list[list[Any]]
+#: Names that a parameter or option cannot have: arguments of the methods, keys of a renderer's description.
+_RESERVED = ("theta_i", "theta_r", "phi", "incident", "part", "type", "id", "model", "paint", "model_file")
+#: Accuracies that callers may ask a model for: searching, rendering, as a rule, reference values.
+ACCURACIES = ("draft", "fast", "default", "high")
 
 
 class Model:
     """Base of the pBRDF models.
 
-    A subclass names its ``parameters`` and ``options`` and gives ``kernel``, its Mueller matrix over generic
-    Dr.Jit floats; evaluation, checks, printing and JSON come from here. Instances are immutable.
+    A subclass declares its ``name``, ``parameters`` and ``options`` and gives ``kernel``, its Mueller matrix over
+    generic Dr.Jit floats. Constructor, signature and table of parameters in the docstring come from the declaration;
+    evaluation, checks, printing and JSON from here. What fits, plans, plots and renderers ask of a model are methods
+    whose defaults hold for any; a subclass that knows better overrides them (docs/own-model.md). Instances are
+    immutable.
 
     Attributes
     ----------
@@ -37,7 +46,10 @@ class Model:
     parameters
         The parameters, in the order of fits and tables.
     options
-        Choices of the model by name, the default first.
+        Choices of the model by name (:class:`Option`), the default first.
+    gaussian_slopes
+        Whether the two slopes of the facets are normal variables with :meth:`lobe_width` as standard deviation; a
+        renderer then draws the specular part from them alone.
     values
         Parameter values by name: float, NumPy array, xarray DataArray or Dr.Jit array.
     chosen
@@ -45,21 +57,41 @@ class Model:
     """
 
     name: ClassVar[str]
-    parameters: ClassVar[tuple[Parameter, ...]]
-    options: ClassVar[Mapping[str, tuple[str, ...]]]
+    parameters: ClassVar[tuple[Parameter, ...]] = ()
+    options: ClassVar[Mapping[str, Option]] = {}
+    gaussian_slopes: ClassVar[bool] = False
 
     values: Mapping[str, Any]
     chosen: Mapping[str, str]
 
-    def __init__(self, values: Mapping[str, Any], chosen: Mapping[str, str]) -> None:
-        checked = {p.name: _checked_value(p, values[p.name]) for p in self.parameters}
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        _check_declaration(cls)
+        cls.__signature__ = _signature(cls)  # type: ignore[attr-defined]
+        cls.__doc__ = (
+            f"{inspect.cleandoc(cls.__dict__.get('__doc__') or cls.__name__)}\n\n{_documentation(cls)}"
+        )
+
+    def __init__(self, *given: Any, **named: Any) -> None:
+        try:
+            bound = inspect.signature(type(self)).bind(*given, **named)
+        except TypeError as error:
+            raise TypeError(f"{type(self).__name__}: {error}") from None
+        bound.apply_defaults()
+        values = {p.name: bound.arguments[p.name] for p in self.parameters}
+        for p in self.parameters:
+            if p.extinction_of is not None:
+                index = p.extinction_of
+                values[index], values[p.name] = _split_index(index, p.name, values[index], values[p.name])
+        chosen = {option: bound.arguments[option] for option in self.options}
         for option, choice in chosen.items():
             if choice not in self.options[option]:
                 raise ModelError(
                     f"{option}={choice!r}: choose one of {', '.join(map(repr, self.options[option]))}"
                 )
+        checked = {p.name: _checked_value(p, values[p.name]) for p in self.parameters}
         object.__setattr__(self, "values", checked)
-        object.__setattr__(self, "chosen", dict(chosen))
+        object.__setattr__(self, "chosen", chosen)
         self._check_together()
 
     def __setattr__(self, name: str, value: Any) -> None:
@@ -71,7 +103,74 @@ class Model:
     @classmethod
     def from_values(cls, values: Mapping[str, Any], **chosen: str) -> Self:
         """Build a model from parameter values by name, real and imaginary index apart, and options."""
-        raise NotImplementedError
+        return cls(**values, **chosen)
+
+    # What the rest of the package asks of a model. The defaults hold for any.
+
+    def with_accuracy(self, accuracy: str) -> Self:
+        """The same model, evaluated as exactly as one of :data:`ACCURACIES` says, where it has such an option."""
+        return self.replace(accuracy=accuracy) if accuracy in self.options.get("accuracy", ()) else self
+
+    def for_rendering(self) -> Self:
+        """The same model, evaluated as a renderer does where a scene does not state the accuracy."""
+        return self
+
+    def lane_groups(self, scalars: Mapping[str, Any], size: int, part: str) -> Sequence[np.ndarray | None]:
+        """Directions sorted so that those evaluated together take the same branches of the kernel.
+
+        Parameters
+        ----------
+        scalars
+            Angles and parameters by name: NumPy arrays of shape (size,), or single numbers.
+        size
+            Number of directions.
+        part
+            Part of the model that is evaluated.
+
+        Returns
+        -------
+        sequence
+            Indices (uint32) of each group; None stands for all directions in their order.
+        """
+        return [None]
+
+    @classmethod
+    def fit_bounds(cls, parameter: Parameter, options: Mapping[str, str]) -> tuple[float, float]:
+        """Default bounds of a parameter in a fit under these options."""
+        return parameter.lower, parameter.upper
+
+    def lobe_width(self, values: Mapping[str, Any] | None = None) -> Any:
+        """Standard deviation of one slope component of the facets, by which the specular lobe is resolved.
+
+        Parameters
+        ----------
+        values
+            Parameters by name over generic floats, for a renderer; None for those of the model itself.
+
+        Returns
+        -------
+        float
+            The default measures the lobe of the model's own values, see
+            :func:`~pbrdf.models.lobe.measured_lobe_width`; of a map those of its least and its largest values.
+        """
+        if "_lobe_width" not in self.__dict__:
+            ends = {name: _ends(value) for name, value in self.values.items()}
+            width = measured_lobe_width(self.from_values(ends, **self.chosen))
+            object.__setattr__(self, "_lobe_width", width)
+        return self.__dict__["_lobe_width"]
+
+    def albedos(self, cos_theta: Any, values: Mapping[str, Any]) -> tuple[Any, Any]:
+        """Rough shares of light from one direction that facets and body reflect, by which a renderer draws either.
+
+        Parameters
+        ----------
+        cos_theta
+            Cosine of the zenith angle of the ray, > 0, a generic float.
+        values
+            Parameters by name over generic floats.
+        """
+        even = 0.0 * cos_theta + 0.5
+        return even, even
 
     def kernel(self, geometry: Geometry, values: Mapping[str, Any], part: str = "total") -> Matrix:
         """4 x 4 Mueller matrix (1/sr) over generic Dr.Jit floats; structural zeros are the Python number 0.
@@ -81,7 +180,7 @@ class Model:
         geometry
             Vectors of the geometry; both rays above the horizon.
         values
-            Parameter values by name, Dr.Jit floats; ``kappa`` may be None for a dielectric.
+            Parameter values by name, Dr.Jit floats; None for one that is declared ``vanishing`` and is 0 everywhere.
         part
             ``"total"``, ``"specular"`` or ``"diffuse"``.
         """
@@ -199,56 +298,63 @@ class Model:
         return "\n".join([f"model {cls.name}", *rows])
 
 
-def load_model(source: str | os.PathLike[str] | Mapping[str, Any]) -> Model:
-    """Load a model from a JSON file, JSON text or the dictionary of :meth:`Model.to_dict`.
+def _check_declaration(cls: type[Model]) -> None:
+    """Check what a subclass says of itself; raises TypeError, as it is an error of the program."""
+    names = [*(p.name for p in cls.parameters), *cls.options]
+    for name in names:
+        if not name.isidentifier():
+            raise TypeError(f"{cls.__name__}: {name!r} cannot be the name of a parameter or option")
+        if names.count(name) > 1 or name in _RESERVED:
+            raise TypeError(
+                f"{cls.__name__}: the name {name!r} is taken: give the parameter or option another"
+            )
+    for p in cls.parameters:
+        if p.extinction_of is not None and p.extinction_of not in names:
+            raise TypeError(
+                f"{cls.__name__}: {p.name} is the extinction of {p.extinction_of!r}, which is missing"
+            )
 
-    Raises
-    ------
-    ModelError
-        If the text is not JSON, or names an unknown model, parameter or option; the file is named.
-    """
-    from pbrdf.models import MODELS
 
-    where = ""
-    if isinstance(source, Mapping):
-        content: Any = source
-    else:
-        text = os.fspath(source)
-        if not text.lstrip().startswith("{"):
-            where = f"{text}: "
-            try:
-                text = Path(text).read_text(encoding="utf-8")
-            except (OSError, UnicodeDecodeError) as error:
-                raise ModelError(f"{where}cannot be read as a model: {error}") from error
-        try:
-            content = json.loads(text)
-        except json.JSONDecodeError as error:
-            raise ModelError(
-                f"{where}not JSON, line {error.lineno} column {error.colno}: {error.msg}"
-            ) from error
-    if not isinstance(content, Mapping) or "model" not in content:
-        raise ModelError(f'{where}not a model: the key "model" is missing')
-    cls = MODELS.get(content["model"]) if isinstance(content["model"], str) else None
-    if cls is None:
-        raise ModelError(f"{where}unknown model {content['model']!r}: known are {', '.join(MODELS)}")
-    parameters, options = content.get("parameters"), content.get("options", {})
-    if not isinstance(parameters, Mapping) or not isinstance(options, Mapping):
-        raise ModelError(f'{where}"parameters" and "options" must be tables of name and value')
-    names = [p.name for p in cls.parameters]
-    for kind, given, known in (("parameter", parameters, names), ("option", options, list(cls.options))):
-        for name in given:
-            if name not in known:
-                raise ModelError(
-                    f"{where}unknown {kind} {name!r} of {cls.name}: known are {', '.join(known)}"
-                )
-    missing = [p.name for p in cls.parameters if p.fitted and p.name not in parameters]
-    if missing:
-        raise ModelError(f"{where}parameter {missing[0]!r} of {cls.name} is missing")
-    values = {p.name: parameters.get(p.name, p.default) for p in cls.parameters}
-    try:
-        return cls.from_values(values, **options)
-    except ModelError as error:
-        raise ModelError(f"{where}{error}") from error
+def _signature(cls: type[Model]) -> inspect.Signature:
+    """The parameters in their order, then by name those that a fit holds, and the options."""
+    by_name = inspect.Parameter.KEYWORD_ONLY
+    fitted = [
+        inspect.Parameter(p.name, inspect.Parameter.POSITIONAL_OR_KEYWORD) for p in cls.parameters if p.fitted
+    ]
+    held = [inspect.Parameter(p.name, by_name, default=p.default) for p in cls.parameters if not p.fitted]
+    options = [inspect.Parameter(name, by_name, default=choices[0]) for name, choices in cls.options.items()]
+    return inspect.Signature([*fitted, *held, *options])
+
+
+def _documentation(cls: type[Model]) -> str:
+    """Sections of the docstring that the declaration gives."""
+    complex_ones = {p.extinction_of: p.name for p in cls.parameters if p.extinction_of is not None}
+    stated = {p.name: p.documentation() for p in sorted(cls.parameters, key=lambda p: not p.fitted)}
+    for index, extinction in complex_ones.items():
+        stated[index] += f" A complex number {index} − i·{extinction} is taken apart."
+    stated |= {name: choices.documentation() for name, choices in cls.options.items()}
+    lines = ["Parameters", "----------"]
+    for name, sentence in stated.items():
+        lines += [name, textwrap.indent(textwrap.fill(f"{sentence[0].upper()}{sentence[1:]}", 100), "    ")]
+    lines += ["", "Every parameter may be an array (a map of paints) that broadcasts against the angles."]
+    lines += ["", "Raises", "------", "ModelError"]
+    lines += ["    If a parameter is not finite or outside its domain, or an option is unknown."]
+    return "\n".join(lines)
+
+
+def _split_index(index: str, extinction: str, n: Any, kappa: Any) -> tuple[Any, Any]:
+    """Split a complex index n − iκ into (n, κ); a real one keeps the κ given apart."""
+    if is_drjit(n) or not np.iscomplexobj(n):
+        return n, kappa
+    if np.any(np.imag(n) != 0.0) and np.any(np.asarray(kappa) != 0.0):
+        raise ModelError(
+            f"the extinction is given twice: as the imaginary part of {index} and as {extinction}"
+        )
+    if np.any(np.imag(n) > 0.0):
+        raise ModelError(
+            f"{index}={n}: the imaginary part must be ≤ 0, the convention is n − iκ with κ ≥ 0; give the conjugate"
+        )
+    return n.real, (-n.imag if np.any(np.imag(n) != 0.0) else kappa)
 
 
 def _checked_part(part: str) -> str:
@@ -260,10 +366,10 @@ def _checked_part(part: str) -> str:
 def _checked_value(parameter: Parameter, value: Any) -> Any:
     """Return the value, floats for scalars, or raise ModelError naming the parameter and its domain."""
     kept = value
-    if evaluation.is_drjit(value):
-        if evaluation.is_symbolic(value):
+    if is_drjit(value):
+        if is_symbolic(value):
             return value
-        numbers = evaluation.drjit_to_numpy(value)
+        numbers = drjit_to_numpy(value)
     else:
         try:
             numbers = np.asarray(value, dtype=float)
@@ -289,16 +395,24 @@ def _checked_value(parameter: Parameter, value: Any) -> Any:
     return kept
 
 
+def _ends(value: Any) -> Any:
+    """A number, or the least and the largest value of an array."""
+    if isinstance(value, float):
+        return value
+    numbers = drjit_to_numpy(value) if is_drjit(value) else np.asarray(value)
+    return np.array([numbers.min(), numbers.max()])
+
+
 def _plain(value: Any) -> Any:
     if isinstance(value, float):
         return value
-    if evaluation.is_drjit(value):
-        return evaluation.drjit_to_numpy(value).tolist()
+    if is_drjit(value):
+        return drjit_to_numpy(value).tolist()
     return np.asarray(value).tolist()
 
 
 def _brief(value: Any) -> str:
     if isinstance(value, float):
         return f"{value:g}"
-    numbers = evaluation.drjit_to_numpy(value) if evaluation.is_drjit(value) else np.asarray(value)
+    numbers = drjit_to_numpy(value) if is_drjit(value) else np.asarray(value)
     return f"<{'x'.join(map(str, numbers.shape))} in {numbers.min():g} … {numbers.max():g}>"

@@ -7,21 +7,22 @@ reflect, the other the average of the Fresnel transmission of body light over th
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Self
 
 import numpy as np
 
 from pbrdf.errors import ModelError
-from pbrdf.models import evaluation
-from pbrdf.models.base import Matrix, Model
-from pbrdf.models.parameters import Parameter
+from pbrdf.models.arrays import Matrix, to_numpy
+from pbrdf.models.base import Model
+from pbrdf.models.parameters import Option, Parameter
 from pbrdf.optics.diffuse import mrpv
+from pbrdf.optics.facet_reflection import facet_reflection, tan2_tilt
 from pbrdf.optics.facets import projected_area_density
 from pbrdf.optics.fresnel import mueller_reflection
 from pbrdf.optics.geometry import Geometry
-from pbrdf.optics.quadrature import ACCURACIES
-from pbrdf.optics.reference_planes import facet_rotations
+from pbrdf.optics.quadrature import ACCURACIES, CLEAR_WEDGE, SIGMA_25
 from pbrdf.optics.shadowing import SHADOWING
 from pbrdf.optics.transmission import (
     NORMALIZATIONS,
@@ -30,133 +31,133 @@ from pbrdf.optics.transmission import (
     exit_polarisation,
 )
 
-__all__ = ["DoubleGauss", "ReciprocalDoubleGauss", "specular_reflection", "split_index"]
+__all__ = ["DoubleGauss", "ReciprocalDoubleGauss", "specular_reflection"]
 
 _INFINITY = float("inf")
 
 _PARAMETERS = (
     Parameter(
         "sigma", "σ", "1", "standard deviation of one slope component of the facets",
-        0.002, 0.6, (0.001, 1.0), 0.04, logarithmic=True,
+        0.002, 0.6, (0.001, 1.0), 0.04, logarithmic=True, part="specular",
     ),
-    Parameter("n", "n", "1", "real refractive index of the coating", 1.2, 2.6, (0.01, 100.0), 1.6),
+    Parameter(
+        "n", "n", "1", "real refractive index of the coating",
+        1.2, 2.6, (0.01, 100.0), 1.6, part="specular",
+    ),
     Parameter(
         "kappa", "κ", "1", "extinction of the coating's index n − iκ, 0 for a dielectric",
-        0.0, 5.0, (0.0, 100.0), 0.0, fitted=False,
+        0.0, 5.0, (0.0, 100.0), 0.0, fitted=False, part="specular", vanishing=True, extinction_of="n",
     ),
     Parameter(
         "a", "a", "1", "diffuse amplitude, on the data's own scale",
-        1e-4, 100.0, (0.0, _INFINITY), 1.0, logarithmic=True,
+        1e-4, 100.0, (0.0, _INFINITY), 1.0, logarithmic=True, part="diffuse", amplitude=True,
     ),
-    Parameter("k", "k", "1", "Minnaert-type exponent, 1 for a Lambertian body", 0.3, 4.0, (0.0, 20.0), 1.2),
-    Parameter("b", "b", "1", "forward (> 0) or backward (< 0) asymmetry", -3.0, 4.0, (-20.0, 20.0), 0.0),
-    Parameter("t", "t", "1", "polarised share of the diffuse part", 0.0, 1.0, (0.0, 1.0), 0.5),
+    Parameter(
+        "k", "k", "1", "Minnaert-type exponent, 1 for a Lambertian body",
+        0.3, 4.0, (0.0, 20.0), 1.2, part="diffuse",
+    ),
+    Parameter(
+        "b", "b", "1", "forward (> 0) or backward (< 0) asymmetry",
+        -3.0, 4.0, (-20.0, 20.0), 0.0, part="diffuse",
+    ),
+    Parameter(
+        "t", "t", "1", "polarised share of the diffuse part",
+        0.0, 1.0, (0.0, 1.0), 0.5, part="diffuse",
+    ),
 )  # fmt: skip
+
+_SHADOWING = Option(
+    *SHADOWING,
+    description="shadowing and masking of the facets, v-cavity (paper eq. 4), height-correlated smith or none",
+)
+_ACCURACY = Option(
+    *ACCURACIES,
+    description="accuracy of the average over the facets, high (slow) for reference values, draft for searching, "
+    "fast for rendering, see docs/model.md, section 4",
+)
+
+#: Up to this slope standard deviation a renderer averages over the facets with accuracy ``fast``.
+FAST_SIGMA = 0.06
+#: Bounds of a fit for normalization="visible", whose average diverges for k ≤ 1/3.
+_VISIBLE_K = 0.35
+#: cosθ of the direction of view at which the diffuse albedo is estimated: the mean of cosθ over cosθ dω.
+_MEAN_COSINE = 2.0 / 3.0
 
 
 def specular_reflection(geometry: Geometry, sigma: Any, n: Any, kappa: Any | None, shadowing: str) -> Matrix:
-    """f_mf = P G M(−α2) M_r M(α1)/(4 cosθ cosθ_i cosθ_r) in 1/sr, paper eq. (2)."""
-    m = geometry.facet
-    tan2 = (m[0] * m[0] + m[1] * m[1]) / (m[2] * m[2])
-    scale = projected_area_density(m[2], tan2, sigma) * SHADOWING[shadowing](geometry, sigma)
-    scale = scale / (4.0 * m[2] * geometry.cos_i * geometry.cos_r)
-    r = mueller_reflection(geometry.cos_beta, n, kappa)
-    A, B, C = r.mean * scale, r.difference * scale, r.real * scale
-    c1, s1, c2, s2 = facet_rotations(geometry)
-    f = [
-        [A, B * c1, B * s1, 0.0],
-        [B * c2, A * c1 * c2 + C * s1 * s2, A * s1 * c2 - C * c1 * s2, 0.0],
-        [B * s2, A * c1 * s2 - C * s1 * c2, A * s1 * s2 + C * c1 * c2, 0.0],
-        [0.0, 0.0, 0.0, C],
-    ]
-    if r.imaginary is not None:
-        D = r.imaginary * scale
-        f[1][3], f[2][3] = D * s2, -D * c2
-        f[3][1], f[3][2] = -D * s1, D * c1
-    return f
+    """f_mf of Gaussian facets in 1/sr, paper eqs (2)-(4)."""
+    density = projected_area_density(geometry.facet[2], tan2_tilt(geometry), sigma)
+    return facet_reflection(geometry, density, SHADOWING[shadowing](geometry, sigma), n, kappa)
 
 
-class DoubleGauss(Model):
-    """Double-Gauss pBRDF (module docstring): facets that reflect plus polarised diffuse body light.
+class _GaussianFacets(Model):
+    """What both models share: Gaussian facets on a coating of index n − iκ over a body of the MRPV shape."""
 
-    Parameters
-    ----------
-    sigma
-        Standard deviation of one slope component of the facets, 1.
-    n
-        Refractive index n − iκ of the coating; complex allowed, with an imaginary part ≤ 0.
-    a
-        Diffuse amplitude, 1, on the data's own scale.
-    k
-        Minnaert-type exponent, 1; k = 1, b = 0 is Lambertian.
-    b
-        Forward (> 0) or backward (< 0) asymmetry, 1.
-    t
-        Polarised share of the diffuse part, 0 … 1.
-    kappa
-        Extinction κ ≥ 0, if ``n`` is not given as a complex number.
-    normalization
-        Reading of eq. (13): ``"weighted"`` or ``"visible"`` (k > 1/3), see :mod:`pbrdf.optics.transmission`.
-    transmittance
-        Transmittance in M_t: ``"flux"`` or ``"amplitude"``.
-    shadowing
-        ``"v-cavity"`` (paper eq. 4), ``"smith"`` (height-correlated) or ``"none"``.
-    accuracy
-        Accuracy of the average over the facets: ``"default"``, ``"high"`` (slow, for reference values),
-        ``"draft"`` (for searching) or ``"fast"`` (for rendering), see docs/model.md, section 4.
-
-    Every parameter may be an array (a map of paints) that broadcasts against the angles.
-
-    Raises
-    ------
-    ModelError
-        If a parameter is not finite or outside its domain, or an option is unknown.
-    """
-
-    name: ClassVar[str] = "double-gauss"
     parameters: ClassVar[tuple[Parameter, ...]] = _PARAMETERS
-    options: ClassVar[Mapping[str, tuple[str, ...]]] = {
-        "normalization": NORMALIZATIONS,
-        "transmittance": TRANSMITTANCES,
-        "shadowing": tuple(SHADOWING),
-        "accuracy": tuple(ACCURACIES),
-    }
+    gaussian_slopes: ClassVar[bool] = True
 
-    def __init__(
-        self,
-        sigma: Any,
-        n: Any,
-        a: Any,
-        k: Any,
-        b: Any,
-        t: Any,
-        *,
-        kappa: Any = 0.0,
-        normalization: str = "weighted",
-        transmittance: str = "flux",
-        shadowing: str = "v-cavity",
-        accuracy: str = "default",
-    ) -> None:
-        n, kappa = split_index(n, kappa)
-        super().__init__(
-            {"sigma": sigma, "n": n, "kappa": kappa, "a": a, "k": k, "b": b, "t": t},
-            {
-                "normalization": normalization,
-                "transmittance": transmittance,
-                "shadowing": shadowing,
-                "accuracy": accuracy,
-            },
-        )
+    def for_rendering(self) -> Self:
+        """``fast`` where that is exact enough."""
+        smooth = np.max(self.lobe_width()) <= FAST_SIGMA
+        return self.with_accuracy("fast" if smooth else "default")
 
-    @classmethod
-    def from_values(cls, values: Mapping[str, Any], **chosen: str) -> Self:
-        """Build a model from parameter values by name (``n`` and ``kappa`` apart) and options."""
-        return cls(**values, **chosen)
+    def lane_groups(self, scalars: Mapping[str, Any], size: int, part: str) -> Sequence[np.ndarray | None]:
+        """Directions whose average over the facets takes the mapped wedge apart from the others."""
+        if part == "specular" or self.chosen["accuracy"] in ("high", "fast"):
+            return [None]
+        sigma = np.asarray(scalars["sigma"])
+        # zenith angle up to which the edge of the wedge lies farther out than CLEAR_WEDGE
+        limit = np.where(sigma <= SIGMA_25, np.arctan2(1.0, CLEAR_WEDGE * sigma), -1.0)
+        if all(np.max(scalars[name]) < np.min(limit) for name in ("theta_i", "theta_r")):
+            return [None]
+        wedge = np.maximum(scalars["theta_i"], scalars["theta_r"]) >= limit
+        wedge = np.broadcast_to(wedge, (size,))
+        if wedge.all() or not wedge.any():
+            return [None]
+        return [np.flatnonzero(~wedge).astype(np.uint32), np.flatnonzero(wedge).astype(np.uint32)]
+
+    def lobe_width(self, values: Mapping[str, Any] | None = None) -> Any:
+        """σ."""
+        return (self.values if values is None else values)["sigma"]
+
+    def albedos(self, cos_theta: Any, values: Mapping[str, Any]) -> tuple[Any, Any]:
+        """Fresnel reflectance of the flat surface, and the diffuse albedo of a mean direction."""
+        facets = mueller_reflection(cos_theta, values["n"], values["kappa"]).mean
+        body = mrpv(cos_theta, _MEAN_COSINE, -_MEAN_COSINE * cos_theta, values["a"], values["k"], values["b"])
+        return facets, math.pi * body
 
     def _check_together(self) -> None:
-        check_index(self.values["n"], self.values["kappa"])
+        n, kappa = to_numpy(self.values["n"]), to_numpy(self.values["kappa"])
+        if n is not None and kappa is not None and ((n < 1.0) & (kappa == 0.0)).any():
+            raise ModelError("n must be at least 1 where kappa is 0: the coating is denser than air")
+
+
+class DoubleGauss(_GaussianFacets):
+    """Double-Gauss pBRDF (module docstring): facets that reflect plus polarised diffuse body light."""
+
+    name: ClassVar[str] = "double-gauss"
+    options: ClassVar[Mapping[str, Option]] = {
+        "normalization": Option(
+            *NORMALIZATIONS,
+            description="reading of paper eq. (13), visible needs k > 1/3, see :mod:`pbrdf.optics.transmission`",
+        ),
+        "transmittance": Option(*TRANSMITTANCES, description="transmittance in M_t"),
+        "shadowing": _SHADOWING,
+        "accuracy": _ACCURACY,
+    }
+
+    @classmethod
+    def fit_bounds(cls, parameter: Parameter, options: Mapping[str, str]) -> tuple[float, float]:
+        """Those of the parameter, away from where the average ``visible`` diverges."""
+        lower, upper = super().fit_bounds(parameter, options)
+        if parameter.name == "k" and options.get("normalization") == "visible":
+            lower = max(lower, _VISIBLE_K)
+        return lower, upper
+
+    def _check_together(self) -> None:
+        super()._check_together()
         if self.chosen["normalization"] == "visible":
-            k = evaluation.to_numpy(self.values["k"])
+            k = to_numpy(self.values["k"])
             if k is not None and (k <= 1.0 / 3.0).any():
                 raise ModelError(
                     f"k={k.min():g}: normalization='visible' needs k > 1/3, its integral diverges"
@@ -194,47 +195,15 @@ class DoubleGauss(Model):
         f[2][0] = f[2][0] + polarised * u
 
 
-class ReciprocalDoubleGauss(Model):
+class ReciprocalDoubleGauss(_GaussianFacets):
     """Double-Gauss pBRDF in which body light also enters through the facets; beyond the paper.
 
     f = f_mf + f_rpv [(1 − t) D_s + t D_b], D_b = E[W T_out D_s T_in]/E[W] with the transmittances of flux
-    (docs/model.md, section 3): Helmholtz reciprocity holds for the whole Mueller matrix. Parameters are those
-    of :class:`DoubleGauss`.
+    (docs/model.md, section 3): Helmholtz reciprocity holds for the whole Mueller matrix.
     """
 
     name: ClassVar[str] = "reciprocal-double-gauss"
-    parameters: ClassVar[tuple[Parameter, ...]] = _PARAMETERS
-    options: ClassVar[Mapping[str, tuple[str, ...]]] = {
-        "shadowing": tuple(SHADOWING),
-        "accuracy": tuple(ACCURACIES),
-    }
-
-    def __init__(
-        self,
-        sigma: Any,
-        n: Any,
-        a: Any,
-        k: Any,
-        b: Any,
-        t: Any,
-        *,
-        kappa: Any = 0.0,
-        shadowing: str = "v-cavity",
-        accuracy: str = "default",
-    ) -> None:
-        n, kappa = split_index(n, kappa)
-        super().__init__(
-            {"sigma": sigma, "n": n, "kappa": kappa, "a": a, "k": k, "b": b, "t": t},
-            {"shadowing": shadowing, "accuracy": accuracy},
-        )
-
-    @classmethod
-    def from_values(cls, values: Mapping[str, Any], **chosen: str) -> Self:
-        """Build a model from parameter values by name (``n`` and ``kappa`` apart) and options."""
-        return cls(**values, **chosen)
-
-    def _check_together(self) -> None:
-        check_index(self.values["n"], self.values["kappa"])
+    options: ClassVar[Mapping[str, Option]] = {"shadowing": _SHADOWING, "accuracy": _ACCURACY}
 
     def kernel(self, geometry: Geometry, values: Mapping[str, Any], part: str = "total") -> Matrix:
         """4 x 4 Mueller matrix over generic Dr.Jit floats."""
@@ -251,35 +220,3 @@ class ReciprocalDoubleGauss(Model):
                 for j in range(3):
                     f[i][j] = f[i][j] + polarised * block[i][j]
         return f
-
-
-def split_index(n: Any, kappa: Any) -> tuple[Any, Any]:
-    """Split a complex index n − iκ into (n, κ); a real one keeps the κ given apart.
-
-    Raises
-    ------
-    ModelError
-        If the imaginary part is positive, or κ is given twice.
-    """
-    if evaluation.is_drjit(n) or not np.iscomplexobj(n):
-        return n, kappa
-    if np.any(np.imag(n) != 0.0) and np.any(np.asarray(kappa) != 0.0):
-        raise ModelError("the extinction is given twice: as the imaginary part of n and as kappa")
-    if np.any(np.imag(n) > 0.0):
-        raise ModelError(
-            f"n={n}: the imaginary part must be ≤ 0, the convention is n − iκ with κ ≥ 0; give the conjugate"
-        )
-    return n.real, (-n.imag if np.any(np.imag(n) != 0.0) else kappa)
-
-
-def check_index(n: Any, kappa: Any) -> None:
-    """Check that a non-absorbing coating is denser than air.
-
-    Raises
-    ------
-    ModelError
-        If n < 1 where κ = 0.
-    """
-    n, kappa = evaluation.to_numpy(n), evaluation.to_numpy(kappa)
-    if n is not None and kappa is not None and ((n < 1.0) & (kappa == 0.0)).any():
-        raise ModelError("n must be at least 1 where kappa is 0: the coating is denser than air")

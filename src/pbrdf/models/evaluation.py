@@ -8,21 +8,19 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Protocol
 
 import numpy as np
 
 from pbrdf.backend import Backend, get_backend
 from pbrdf.errors import ModelError
-from pbrdf.optics.geometry import geometry_from_angles
-from pbrdf.optics.quadrature import CLEAR_WEDGE, SIGMA_25
+from pbrdf.models.arrays import Matrix, is_drjit, is_zero, to_numpy, weighted_sum
+from pbrdf.models.parameters import Parameter
+from pbrdf.optics.geometry import Geometry, geometry_from_angles
 from pbrdf.optics.stokes import STOKES
 
-if TYPE_CHECKING:
-    from pbrdf.models.base import Model
-
-__all__ = ["CHUNK", "kernel_from_angles", "mueller", "stokes"]
+__all__ = ["CHUNK", "Evaluable", "check_angles", "check_incident", "horizon_guard", "mueller", "stokes"]
 
 #: Directions evaluated at a time: bounds the memory (16 float64 each) and keeps all threads busy.
 CHUNK = 1 << 20
@@ -30,37 +28,23 @@ CHUNK = 1 << 20
 _HORIZON = 1e-12
 
 
-def is_drjit(value: Any) -> bool:
-    """Whether a value is a Dr.Jit array (without importing Dr.Jit)."""
-    return type(value).__module__.startswith("drjit")
+class Evaluable(Protocol):
+    """What is needed of a :class:`~pbrdf.models.base.Model` to evaluate it."""
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]: ...
+
+    @property
+    def values(self) -> Mapping[str, Any]: ...
+
+    def kernel(self, geometry: Geometry, values: Mapping[str, Any], part: str = "total") -> Matrix: ...
+
+    def lane_groups(
+        self, scalars: Mapping[str, Any], size: int, part: str
+    ) -> Sequence[np.ndarray | None]: ...
 
 
-def is_symbolic(value: Any) -> bool:
-    """Whether a Dr.Jit array is inside a symbolic loop or call, so that its content cannot be looked at."""
-    import drjit as dr
-
-    if dr.depth_v(value) > 1:
-        return any(is_symbolic(v) for v in value)
-    array = value.array if dr.is_tensor_v(value) else value
-    return dr.is_jit_v(array) and array.state == dr.VarState.Symbolic
-
-
-def drjit_to_numpy(value: Any) -> np.ndarray:
-    """Content of a Dr.Jit array or tensor as a float64 NumPy array; a single entry gives a scalar."""
-    import drjit as dr
-
-    array = np.asarray(dr.detach(value).numpy(), dtype=float)
-    return array.reshape(()) if array.size == 1 and array.ndim == 1 else array
-
-
-def to_numpy(value: Any) -> np.ndarray | None:
-    """Content of any array, or None for a symbolic Dr.Jit array."""
-    if is_drjit(value):
-        return None if is_symbolic(value) else drjit_to_numpy(value)
-    return np.asarray(value, dtype=float)
-
-
-def kernel_from_angles(model: Model, theta_i: Any, theta_r: Any, phi: Any, values: Any, part: str) -> Any:
+def kernel_from_angles(model: Evaluable, theta_i: Any, theta_r: Any, phi: Any, values: Any, part: str) -> Any:
     """Mueller matrix (nested lists) from angles, 0 at and below the horizon; Dr.Jit floats, unchecked."""
     import drjit as dr
 
@@ -77,7 +61,7 @@ def horizon_guard(theta_i: Any, theta_r: Any) -> tuple[Any, Any, Any]:
     return dr.select(visible, theta_i, 0.0), dr.select(visible, theta_r, 0.0), visible
 
 
-def mueller(model: Model, theta_i: Any, theta_r: Any, phi: Any, part: str) -> Any:
+def mueller(model: Evaluable, theta_i: Any, theta_r: Any, phi: Any, part: str) -> Any:
     """See :meth:`pbrdf.models.base.Model.mueller`."""
 
     def function(matrix: Any) -> list[Any]:
@@ -86,7 +70,7 @@ def mueller(model: Model, theta_i: Any, theta_r: Any, phi: Any, part: str) -> An
     return _evaluate(model, theta_i, theta_r, phi, part, function, (4, 4))
 
 
-def stokes(model: Model, theta_i: Any, theta_r: Any, phi: Any, incident: Any, part: str) -> Any:
+def stokes(model: Evaluable, theta_i: Any, theta_r: Any, phi: Any, incident: Any, part: str) -> Any:
     """See :meth:`pbrdf.models.base.Model.stokes`."""
     if is_drjit(incident) or _depth(incident) > 1:
         return _apply(mueller(model, theta_i, theta_r, phi, part), incident)
@@ -132,20 +116,6 @@ def _depth(incident: Any) -> int:
         return 1
 
 
-def weighted_sum(row: Sequence[Any], weights: Sequence[float]) -> Any:
-    """Σ row·weights over Dr.Jit floats; what is zero by structure is left out of the kernel."""
-    total: Any = 0.0
-    for value, weight in zip(row, weights, strict=True):
-        if weight != 0.0 and not is_zero(value):
-            total = total + (value if weight == 1.0 else value * weight)
-    return total
-
-
-def is_zero(value: Any) -> bool:
-    """Whether a matrix element is the Python number 0: zero by structure."""
-    return isinstance(value, float) and value == 0.0
-
-
 def _apply(matrix: Any, incident: Any) -> Any:
     """Multiply Mueller matrices with an array of incident Stokes vectors."""
     import drjit as dr
@@ -176,7 +146,7 @@ def _apply(matrix: Any, incident: Any) -> Any:
 
 
 def _evaluate(
-    model: Model,
+    model: Evaluable,
     theta_i: Any,
     theta_r: Any,
     phi: Any,
@@ -226,7 +196,7 @@ def check_angles(angles: dict[str, Any]) -> dict[str, np.ndarray]:
 
 
 def _evaluate_numpy(
-    model: Model,
+    model: Evaluable,
     angles: dict[str, Any],
     values: Any,
     part: str,
@@ -246,46 +216,27 @@ def _evaluate_numpy(
     backend = get_backend()
     width = math.prod(shape)
     pieces = []
-    dielectric = not np.any(arrays["kappa"])
+    absent = [p.name for p in model.parameters if p.vanishing and not np.any(arrays[p.name])]
     for start in range(0, total, CHUNK):
         stop = min(start + CHUNK, total)
         piece = {k: (v if isinstance(v, float) else v[start:stop]) for k, v in flat.items()}
         inputs = {k: backend.upload(backend.Float, v) for k, v in piece.items() if not isinstance(v, float)}
         out = dr.empty(backend.Float, (stop - start) * width)
-        for lanes in _lane_groups(piece, stop - start, model, part):
-            _launch(model, backend, piece, inputs, lanes, stop - start, dielectric, part, function, out)
+        for lanes in model.lane_groups(piece, stop - start, part):
+            _launch(model, backend, piece, inputs, lanes, stop - start, absent, part, function, out)
         pieces.append(out.numpy())
     result = pieces[0] if len(pieces) == 1 else np.concatenate(pieces or [np.empty(0)])
     return result.reshape(*grid, *shape)
 
 
-def _lane_groups(piece: dict[str, Any], size: int, model: Model, part: str) -> list[np.ndarray | None]:
-    """Sort the directions by the rule that averages over the facets, so that neighbouring lanes agree.
-
-    None stands for all directions in their order.
-    """
-    if part == "specular" or model.chosen["accuracy"] in ("high", "fast"):
-        return [None]
-    sigma = np.asarray(piece["sigma"])
-    # zenith angle up to which the edge of the wedge lies farther out than CLEAR_WEDGE
-    limit = np.where(sigma <= SIGMA_25, np.arctan2(1.0, CLEAR_WEDGE * sigma), -1.0)
-    if all(np.max(piece[name]) < np.min(limit) for name in ("theta_i", "theta_r")):
-        return [None]
-    wedge = np.maximum(piece["theta_i"], piece["theta_r"]) >= limit
-    wedge = np.broadcast_to(wedge, (size,))
-    if wedge.all() or not wedge.any():
-        return [None]
-    return [np.flatnonzero(~wedge).astype(np.uint32), np.flatnonzero(wedge).astype(np.uint32)]
-
-
 def _launch(
-    model: Model,
+    model: Evaluable,
     backend: Backend,
     scalars: dict[str, Any],
     inputs: dict[str, Any],
     lanes: np.ndarray | None,
     size: int,
-    dielectric: bool,
+    absent: Sequence[str],
     part: str,
     function: Callable[[Any], list[Any]],
     out: Any,
@@ -301,8 +252,7 @@ def _launch(
         return dr.gather(Float, inputs[name], index) if name in inputs else dr.opaque(Float, scalars[name])
 
     values: dict[str, Any] = {p.name: fetch(p.name) for p in model.parameters}
-    if dielectric:
-        values["kappa"] = None
+    values |= dict.fromkeys(absent)
     f = kernel_from_angles(model, fetch("theta_i"), fetch("theta_r"), fetch("phi"), values, part)
     # one packet scatter: several scatters into the same array would each be a kernel of its own
     dr.scatter(out, backend.module.ArrayXf64([Float(x) for x in function(f)]), index)
@@ -310,7 +260,7 @@ def _launch(
 
 
 def _evaluate_xarray(
-    model: Model,
+    model: Evaluable,
     angles: dict[str, Any],
     part: str,
     function: Callable[[Any], list[Any]],
@@ -348,7 +298,7 @@ def _evaluate_xarray(
 
 
 def _evaluate_drjit(
-    model: Model,
+    model: Evaluable,
     angles: dict[str, Any],
     part: str,
     function: Callable[[Any], list[Any]],
@@ -382,9 +332,10 @@ def _evaluate_drjit(
         return Float(value) if is_drjit(value) else dr.opaque(Float, float(value))
 
     values: dict[str, Any] = {name: flatten(value) for name, value in model.values.items()}
-    kappa = to_numpy(model.values["kappa"])
-    if kappa is not None and not kappa.any() and not dr.grad_enabled(values["kappa"]):
-        values["kappa"] = None
+    for p in model.parameters:
+        content = to_numpy(model.values[p.name]) if p.vanishing else None
+        if content is not None and not content.any() and not dr.grad_enabled(values[p.name]):
+            values[p.name] = None
     theta_i, theta_r, phi = (flatten(angles[name]) for name in ("theta_i", "theta_r", "phi"))
     f = kernel_from_angles(model, theta_i, theta_r, phi, values, part)
     # an opaque mask keeps each output a variable of its own: with constant angles it could be an inner node of

@@ -14,8 +14,9 @@ import drjit as dr
 import numpy as np
 
 from pbrdf.backend import get_backend
+from pbrdf.models.arrays import is_zero
 from pbrdf.models.base import Model
-from pbrdf.models.evaluation import check_angles, check_incident, horizon_guard, is_zero
+from pbrdf.models.evaluation import check_angles, check_incident, horizon_guard
 from pbrdf.optics.geometry import Geometry, dot, geometry_from_angles
 
 __all__ = ["DISC", "disc_rule", "kernel_under_disc", "stokes_under_disc"]
@@ -110,10 +111,9 @@ def stokes_under_disc(
     i, r, p = (backend.upload(Float, a) for a in checked.values())
     light = [backend.upload(Float, a) for a in np.broadcast_to(incident, (len(theta_i), 4)).T]
     values: dict[str, Any] = {name: dr.opaque(Float, float(v)) for name, v in model.values.items()}
-    if model.values.get("kappa") == 0.0:
-        values["kappa"] = None
+    values |= {p.name: None for p in model.parameters if p.vanishing and model.values[p.name] == 0.0}
     i, r, visible = horizon_guard(i, r)
-    rule = _fine_enough(radius, float(model.values["sigma"])) if "sigma" in model.values else DISC
+    rule = _fine_enough(radius, float(model.lobe_width()))
     f, _ = kernel_under_disc(model, geometry_from_angles(i, r, p), values, dr.opaque(Float, radius), rule)
     rows = [sum((a * b for a, b in zip(row, light, strict=True) if not is_zero(a)), Float(0.0)) for row in f]
     out = [dr.select(visible, row, 0.0) for row in rows]
@@ -121,9 +121,9 @@ def stokes_under_disc(
     return np.stack([np.broadcast_to(row.numpy(), len(theta_i)) for row in out], axis=-1)
 
 
-def _fine_enough(radius: float, sigma: float) -> Rule:
-    """A rule whose points are closer than the width of the lobe, 2σ for one of the rays."""
-    across = radius / (2.0 * sigma)
+def _fine_enough(radius: float, width: float) -> Rule:
+    """A rule whose points are closer than the lobe is wide, twice its slope width for one of the rays."""
+    across = radius / (2.0 * width)
     return disc_rule(max(6, math.ceil(3.0 * across) + 4), max(12, math.ceil(8.0 * across) + 8))
 
 

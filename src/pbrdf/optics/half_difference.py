@@ -18,9 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pbrdf.data.conventions import azimuth_forward_pi_to_zero
-
-__all__ = ["directions", "from_scattering_plane", "half_difference", "to_scattering_plane"]
+__all__ = ["directions", "facet_tilt", "from_scattering_plane", "half_difference", "to_scattering_plane"]
 
 Array = NDArray[np.float64]
 
@@ -38,6 +36,8 @@ def directions(theta_h: ArrayLike, theta_d: ArrayLike, phi_d: ArrayLike) -> tupl
     theta_i, theta_r, phi
         Zenith angles in [0, π]: above π/2 a direction lies below the surface.
     """
+    from pbrdf.data.conventions import azimuth_forward_pi_to_zero
+
     theta_i, azimuth_i, theta_r, azimuth_r = _spherical(theta_h, theta_d, phi_d)
     return theta_i, theta_r, azimuth_forward_pi_to_zero(azimuth_r - azimuth_i)
 
@@ -132,3 +132,10 @@ def _turned(
             c * rows[..., 2, :] - s * rows[..., 1, :],
         )
     return turned
+
+
+def facet_tilt(theta_i: Array, theta_r: Array, phi: Array) -> Array:
+    """Tilt of the facet that mirrors source into viewer, θ_h of :func:`half_difference`, radians; same shape."""
+    sin_i, sin_r = np.sin(theta_i), np.sin(theta_r)
+    across = np.hypot(sin_r * np.cos(phi) - sin_i, sin_r * np.sin(phi))
+    return np.arctan2(across, np.cos(theta_i) + np.cos(theta_r))

@@ -12,12 +12,10 @@ from pbrdf.models.base import Model
 
 __all__ = ["in_plane_candidates", "out_of_plane_candidates"]
 
-#: Tilts of the mirror facet that resolve the lobe, in units of σ.
+#: Tilts of the mirror facet that resolve the lobe, in units of its slope width.
 _LOBE = (0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0, 5.0, 6.0)
 #: The same out of plane, where there are two tilts.
 _COARSE_LOBE = (0.0, 1.0, 2.0, 3.0, 4.0)
-#: Lobes taken for models that have no σ.
-_PLAIN_SIGMA = 0.05
 
 
 def in_plane_candidates(
@@ -88,7 +86,7 @@ def _positions(smallest: float, zenith: float, step: float) -> np.ndarray:
 
 def _lobe(model: Model, tilts: tuple[float, ...]) -> np.ndarray:
     """Tilts of the mirror facet that resolve the lobe, radians."""
-    return np.arctan(np.array(tilts) * float(model.values.get("sigma", _PLAIN_SIGMA)))
+    return np.arctan(np.array(tilts) * float(model.lobe_width()))
 
 
 def _sample_angles(

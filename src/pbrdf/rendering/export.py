@@ -19,7 +19,7 @@ from pbrdf.data.formats.pbsdf import MOST_WAVELENGTHS, SIMULATED, PolarizedTable
 from pbrdf.errors import DataError, ModelError
 from pbrdf.models import Model
 from pbrdf.optics.half_difference import directions
-from pbrdf.rendering.tabulation import TableError, lobe_width, refined_table
+from pbrdf.rendering.tabulation import TableError, refined_table
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -132,7 +132,7 @@ def write_pbsdf(
     described = "; ".join(f"{wavelength} nm {model!r}" for wavelength, model in ordered.items())
     table = replace(table, description=f"{SIMULATED} {pbrdf.__version__}: {described}")
     write_table(table, path)
-    width = min(lobe_width(model) for model in ordered.values())
+    width = min(float(model.lobe_width()) for model in ordered.values())
     return PbsdfExport(
         path=path,
         table=table,

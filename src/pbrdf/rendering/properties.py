@@ -8,15 +8,13 @@ import numpy as np
 
 from pbrdf.data.paints import load_paint
 from pbrdf.errors import ModelError
-from pbrdf.models import MODELS, Model, load_model
+from pbrdf.models import MODELS, DoubleGauss, Model, load_model
 from pbrdf.models.parameters import Parameter
 
-__all__ = ["FAST_SIGMA", "PLUGIN", "Paint", "bsdf_dict", "read_properties"]
+__all__ = ["PLUGIN", "Paint", "bsdf_dict", "read_properties"]
 
 #: Name of the plugin in scenes.
 PLUGIN = "pbrdf"
-#: Up to this slope standard deviation the facets are averaged with accuracy ``fast`` unless another is asked for.
-FAST_SIGMA = 0.06
 
 
 class Paint(NamedTuple):
@@ -28,7 +26,7 @@ class Paint(NamedTuple):
         The model with its options; its values are those of the scene, an array of the least and the largest where
         a texture holds many.
     textures
-        Mitsuba texture of every parameter by name; without ``kappa`` for a dielectric.
+        Mitsuba texture of every parameter by name; without those that vanish.
     """
 
     model: Model
@@ -50,9 +48,10 @@ def bsdf_dict(model: Model) -> dict[str, Any]:
         If a parameter is an array of other than two dimensions.
     """
     described: dict[str, Any] = {"type": PLUGIN, "model": model.name}
+    vanishing = [p.name for p in model.parameters if p.vanishing]
     for name, value in model.values.items():
         number = np.asarray(value, dtype=float)
-        if name == "kappa" and not number.any():
+        if name in vanishing and not number.any():
             continue
         if number.ndim == 0:
             described[name] = float(number)
@@ -95,7 +94,7 @@ def read_properties(props: Any) -> Paint:
     """
     given = props.keys()
     base = _base_model(props, given)
-    cls = type(base) if base is not None else MODELS["double-gauss"]
+    cls = type(base) if base is not None else DoubleGauss
     if "model" in given:
         name = props["model"]
         if name not in MODELS:
@@ -116,9 +115,12 @@ def read_properties(props: Any) -> Paint:
             textures[parameter.name] = texture
     chosen = {} if base is None else dict(base.chosen)
     chosen |= {option: props[option] for option in cls.options if option in given}
+    model = cls.from_values(values, **chosen)
     if chosen.get("accuracy", "default") == "default" and "accuracy" not in given:
-        chosen["accuracy"] = "fast" if np.max(values["sigma"]) <= FAST_SIGMA else "default"
-    return Paint(cls.from_values(values, **chosen), textures)
+        model = model.for_rendering()
+    # a width that has to be measured must be so now: where the renderer asks for it, kernels are being recorded
+    model.lobe_width()
+    return Paint(model, textures)
 
 
 def _base_model(props: Any, given: list[str]) -> Model | None:
@@ -136,13 +138,13 @@ def _base_model(props: Any, given: list[str]) -> Model | None:
 
 
 def _texture(props: Any, parameter: Parameter, base: Model | None) -> tuple[Any, Any]:
-    """Texture of a parameter (None for the κ of a dielectric), and what is known of its values."""
+    """Texture of a parameter (None for one that vanishes), and what is known of its values."""
     name = parameter.name
     if name not in props:
         default = parameter.default if base is None else base.values[name]
         if np.ndim(default):
             raise ModelError(f"{name} of the model is an array: give the plugin a bitmap of it instead")
-        if name == "kappa" and default == 0.0:
+        if parameter.vanishing and default == 0.0:
             return None, 0.0
         return props.get_unbounded_texture(name, float(default)), default
     value = props[name]

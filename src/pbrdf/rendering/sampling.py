@@ -3,51 +3,39 @@
 Of the facets those that the ray sees are drawn, after Heitz and d'Eon, "Importance Sampling Microfacet-Based BSDFs
 using the Distribution of Visible Normals", Computer Graphics Forum 33, 103 (2014), in the form for V-cavities, the
 geometry of the model's own shadowing: draw a facet, and take it or its opposite in proportion to what the ray sees
-of them. The two slopes of a facet are normal variables, so nothing has to be inverted numerically. The diffuse part is
-sampled by the cosine. The share of the two follows estimates of their albedos.
+of them. The two slopes of a facet are drawn as normal variables, so nothing has to be inverted numerically. The diffuse
+part is sampled by the cosine. The share of the two follows estimates of their albedos.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import Any
 
 import drjit as dr
 
-from pbrdf.optics.diffuse import mrpv
+from pbrdf.optics.facet_reflection import tan2_tilt
 from pbrdf.optics.facets import projected_area_density
-from pbrdf.optics.fresnel import mueller_reflection
 from pbrdf.optics.geometry import Geometry
 
-__all__ = ["facet_share", "pdf", "sample_direction"]
+__all__ = ["LEAST_SHARE", "facet_share", "pdf", "sample_direction"]
 
 #: Least share of either part, so that a wrong estimate costs noise only.
-_LEAST = 0.1
-#: cosθ of the direction of view at which the diffuse albedo is estimated: the mean of cosθ over cosθ dω.
-_MEAN_COSINE = 2.0 / 3.0
+LEAST_SHARE = 0.1
 
 
-def facet_share(cos_theta: Any, values: Mapping[str, Any]) -> Any:
+def facet_share(facets: Any, body: Any) -> Any:
     """Share of the samples that goes to the facets, strictly between 0 and 1.
-
-    R/(R + A): Fresnel reflectance of the flat surface and the diffuse albedo of a mean direction.
 
     Parameters
     ----------
-    cos_theta
-        Cosine of the zenith angle of the known ray, > 0.
-    values
-        Parameters by name, floats of Mitsuba's.
+    facets, body
+        Rough albedos of both parts, see :meth:`pbrdf.models.base.Model.albedos`.
     """
-    R = mueller_reflection(cos_theta, values["n"], values["kappa"]).mean
-    A = math.pi * mrpv(
-        cos_theta, _MEAN_COSINE, -_MEAN_COSINE * cos_theta, values["a"], values["k"], values["b"]
-    )
-    return _LEAST + (1.0 - 2.0 * _LEAST) * R / (R + A)
+    return LEAST_SHARE + (1.0 - 2.0 * LEAST_SHARE) * facets / (facets + body)
 
 
-def pdf(geometry: Geometry, cos_known: Any, cos_drawn: Any, share: Any, sigma: Any) -> Any:
+def pdf(geometry: Geometry, cos_known: Any, cos_drawn: Any, share: Any, width: Any) -> Any:
     """Density of :func:`sample_direction`, 1/sr.
 
     Parameters
@@ -58,14 +46,13 @@ def pdf(geometry: Geometry, cos_known: Any, cos_drawn: Any, share: Any, sigma: A
         Cosine of the zenith angle of the ray that was known, and of that which was drawn.
     share
         Share of the facets; the number 0 or 1 if one part is sampled alone.
-    sigma
-        Slope standard deviation.
+    width
+        Standard deviation of the slopes that are drawn.
     """
     density: Any = 0.0
     if not _is_number(share, 0.0):
         m = geometry.facet
-        tan2 = (m[0] * m[0] + m[1] * m[1]) / (m[2] * m[2])
-        P = projected_area_density(m[2], tan2, sigma)
+        P = projected_area_density(m[2], tan2_tilt(geometry), width)
         # visible facets: P min(cosβ/(cosθ cosθ_known), 2); mirrored direction: 1/(4 cosβ)
         density = share * P * dr.minimum(0.25 / (m[2] * cos_known), 0.5 / geometry.cos_beta)
     if not _is_number(share, 1.0):
@@ -73,14 +60,14 @@ def pdf(geometry: Geometry, cos_known: Any, cos_drawn: Any, share: Any, sigma: A
     return density
 
 
-def sample_direction(known: Any, share: Any, sigma: Any, sample1: Any, sample2: Any) -> tuple[Any, Any]:
+def sample_direction(known: Any, share: Any, width: Any, sample1: Any, sample2: Any) -> tuple[Any, Any]:
     """Draw a direction for light that arrives along the other.
 
     Parameters
     ----------
     known
         Unit vector of the known ray in the shading frame, above the horizon.
-    share, sigma
+    share, width
         As for :func:`pdf`.
     sample1, sample2
         Random numbers: one that chooses the part and the facet, two for the direction.
@@ -93,7 +80,7 @@ def sample_direction(known: Any, share: Any, sigma: Any, sample1: Any, sample2: 
     import mitsuba as mi
 
     facets = sample1 < share
-    radius = sigma * dr.sqrt(-2.0 * dr.log(1.0 - sample2[0]))
+    radius = width * dr.sqrt(-2.0 * dr.log(1.0 - sample2[0]))
     sine, cosine = dr.sincos(2.0 * math.pi * sample2[1])
     x, y = radius * cosine, radius * sine
     # cosines to the facet and to its opposite, times the same length; the sum is positive

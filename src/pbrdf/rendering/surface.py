@@ -11,7 +11,7 @@ import drjit as dr
 
 from pbrdf.rendering.properties import Paint
 from pbrdf.rendering.reference_planes import LightPath, light_path, to_mitsuba
-from pbrdf.rendering.sampling import facet_share, pdf, sample_direction
+from pbrdf.rendering.sampling import LEAST_SHARE, facet_share, pdf, sample_direction
 
 __all__ = ["Reflection", "Surface"]
 
@@ -58,23 +58,28 @@ class Surface:
         body = ctx.is_enabled(mi.BSDFFlags.DiffuseReflection, 1)
         self.part: Any = _PARTS[facets, body]
         spectra = {name: texture.eval(si, active) for name, texture in paint.textures.items()}
+        absent = {p.name: None for p in paint.model.parameters if p.vanishing}
         #: parameters by name, for every wavelength or colour channel
         self._channels = [
-            {"kappa": None} | {name: spectrum[i] for name, spectrum in spectra.items()}
+            absent | {name: spectrum[i] for name, spectrum in spectra.items()}
             for i in range(dr.size_v(mi.UnpolarizedSpectrum))
         ]
         # Directions are drawn with one set of numbers for all channels. It is detached: the technique of sampling
         # stays as it is while an image is differentiated, only the integrand changes.
         average = self._channels[0]
         if not all(_equal(average, values) for values in self._channels[1:]):
-            average = {"kappa": None} | {name: dr.mean(spectrum) for name, spectrum in spectra.items()}
+            average = absent | {name: dr.mean(spectrum) for name, spectrum in spectra.items()}
         average = {name: None if value is None else dr.detach(value) for name, value in average.items()}
-        self._sigma = average["sigma"]
+        self._width = paint.model.lobe_width(average)
         above = si.wi[2] > _HORIZON
-        if facets != body:
-            self._share: Any = float(facets)
+        if not facets:
+            self._share: Any = 0.0
+        elif body:
+            cosine = dr.select(above, si.wi[2], 1.0)
+            self._share = facet_share(*paint.model.albedos(cosine, average))
         else:
-            self._share = facet_share(dr.select(above, si.wi[2], 1.0), average)
+            # normal slopes alone would miss the tails of another lobe
+            self._share = 1.0 if paint.model.gaussian_slopes else 1.0 - LEAST_SHARE
 
     def towards(self, wo: Any, active: Any) -> Reflection:
         """Describe the light between ``si.wi`` and the direction ``wo``."""
@@ -120,7 +125,7 @@ class Surface:
             return mi.Float(0.0)
         g = path.geometry
         cos_known = g.cos_r if self._radiance else g.cos_i
-        return dr.select(above, pdf(g, cos_known, cosine, self._share, self._sigma), 0.0)
+        return dr.select(above, pdf(g, cos_known, cosine, self._share, self._width), 0.0)
 
     def sample(self, sample1: Any, sample2: Any) -> tuple[Any, Any]:
         """Draw the other direction; also tell whether it comes from the facets."""
@@ -128,7 +133,7 @@ class Surface:
 
         normal = mi.Vector3f(0.0, 0.0, 1.0)
         known = dr.select(self._known[2] > _HORIZON, self._known, normal)
-        return sample_direction(known, self._share, self._sigma, sample1, sample2)
+        return sample_direction(known, self._share, self._width, sample1, sample2)
 
 
 def _equal(a: dict[str, Any], b: dict[str, Any]) -> bool:

@@ -19,7 +19,7 @@ from pbrdf.data.formats.pbsdf import HORIZON, PolarizedTable, mueller_to_pbsdf
 from pbrdf.models import Model
 from pbrdf.optics.half_difference import directions, half_difference
 
-__all__ = ["LARGEST_TABLE", "ZENITH_LIMIT", "TableError", "lobe_width", "random_directions", "refined_table"]
+__all__ = ["LARGEST_TABLE", "ZENITH_LIMIT", "TableError", "random_directions", "refined_table"]
 
 Array = NDArray[np.float64]
 Progress = Callable[[int, int], None]
@@ -76,22 +76,6 @@ class _Needs(NamedTuple):
     error: Array
 
 
-def lobe_width(model: Model) -> float:
-    """Slope standard deviation σ of the specular lobe, from its half width at half maximum at θ_d = 30°.
-
-    The tangent of θ_h at which the density of the facets, f00 cosθ_h cosθ_i cosθ_r of the specular part, has fallen to
-    half, divided by √(2 ln 2); 0.5 for a model without a specular part, and at most that.
-    """
-    theta_h = np.geomspace(1e-4, 1.0, 600)
-    theta_i, theta_r, phi = directions(theta_h, math.radians(30.0), math.pi / 2)
-    intensity = model.mueller(theta_i, theta_r, phi, part="specular")[:, 0, 0]
-    intensity = intensity * np.cos(theta_h) * np.cos(theta_i) * np.cos(theta_r)
-    below = np.flatnonzero(intensity < 0.5 * intensity[0])
-    if not below.size or not intensity[0] > 0.0:
-        return 0.5
-    return min(float(np.tan(theta_h[below[0]])) / math.sqrt(2.0 * math.log(2.0)), 0.5)
-
-
 def random_directions(width: float, count: int, seed: int = 0) -> dict[str, tuple[Array, Array, Array]]:
     """Random geometries with both zenith angles up to :data:`ZENITH_LIMIT`, by region.
 
@@ -102,7 +86,7 @@ def random_directions(width: float, count: int, seed: int = 0) -> dict[str, tupl
     Parameters
     ----------
     width
-        See :func:`lobe_width`.
+        See :meth:`pbrdf.models.base.Model.lobe_width`.
     count
         How many in each region.
     seed
@@ -165,7 +149,7 @@ def refined_table(
     errors
         Its errors for ``"hemisphere"``, ``"lobe"`` and ``"both"``: at the worst wavelength.
     """
-    samples = [random_directions(lobe_width(model), points) for model in models]
+    samples = [random_directions(float(model.lobe_width()), points) for model in models]
     needs = [_needs(models, axis) for axis in range(3)]
     first = min(_FIRST_TOLERANCE[0] * median, _FIRST_TOLERANCE[1] * percentile_99)
     finest = first / 100.0
@@ -215,7 +199,7 @@ def _needs(models: Sequence[Model], axis: int) -> _Needs:
         start = np.concatenate(
             [
                 np.stack(half_difference(*g))
-                for g in random_directions(lobe_width(model), _LINES // 2, 1).values()
+                for g in random_directions(float(model.lobe_width()), _LINES // 2, 1).values()
             ],
             axis=1,
         )

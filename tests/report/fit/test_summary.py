@@ -8,7 +8,7 @@ import xarray as xr
 from rich.console import Console
 
 import pbrdf
-from pbrdf.inversion.fit import Optimum
+from pbrdf.inversion.estimates import DistinctOptimum
 from pbrdf.report.fit.folder import fit_record
 from pbrdf.report.fit.subject import Report
 from pbrdf.report.fit.summary import (
@@ -133,7 +133,11 @@ def test_optima_in_words(report):
     values = {"sigma": 0.04, "n": 1.6}
     result = replace(
         report.result,
-        optima=[Optimum(values, 100.0, 52), Optimum(values, 100.3, 1), Optimum(values, 900.0, 3)],
+        optima=[
+            DistinctOptimum(values, 100.0, 52),
+            DistinctOptimum(values, 100.3, 1),
+            DistinctOptimum(values, 900.0, 3),
+        ],
         starts=64,
         converged=60,
     )

@@ -14,10 +14,10 @@ if TYPE_CHECKING:
     from pbrdf.inversion.bootstrap import Bootstrap
     from pbrdf.inversion.crossvalidation import CrossValidation
     from pbrdf.inversion.erroranalysis import ErrorAnalysis
-    from pbrdf.inversion.fit import FitResult
     from pbrdf.inversion.identifiability import Identifiability
     from pbrdf.inversion.plausibility import Finding
     from pbrdf.inversion.profile import Contour, Profile
+    from pbrdf.inversion.result import FitResult
 
 __all__ = ["Checks", "run_checks"]
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from pbrdf.inversion.fit import Estimate
+    from pbrdf.inversion.estimates import Estimate
     from pbrdf.inversion.profile import Contour
     from pbrdf.report.fit.subject import Report
 

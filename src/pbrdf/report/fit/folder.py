@@ -23,7 +23,7 @@ from pbrdf.report.numbers import plain
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pbrdf.inversion.fit import Estimate
+    from pbrdf.inversion.estimates import Estimate
 
 __all__ = [
     "FIGURE_FORMATS",

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pbrdf.inversion.fit import FitResult
+    from pbrdf.inversion.result import FitResult
     from pbrdf.report.fit.checks import Checks
 
 __all__ = ["Report"]

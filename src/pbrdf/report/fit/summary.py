@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pbrdf.inversion.fit import NEAR_SPECULAR, Estimate, FitResult, near_specular_tilt
+from pbrdf.inversion.comparison import NEAR_SPECULAR, near_specular_tilt
+from pbrdf.inversion.estimates import Estimate
+from pbrdf.inversion.result import FitResult
 from pbrdf.report.dataset.describe import cautions, illumination_in_words, shown_unit, wavelengths_in_words
 from pbrdf.report.fit.subject import Report
 from pbrdf.report.numbers import brief, per_cent, with_error
@@ -411,7 +413,7 @@ def _dolp(error: float) -> str:
 
 def _remarks_on_errors(result: FitResult) -> list[str]:
     tilt = near_specular_tilt(result.model)
-    in_sigma = math.tan(tilt) / float(result.model.values["sigma"])
+    in_sigma = math.tan(tilt) / float(result.model.lobe_width())
     width = f"{NEAR_SPECULAR:g} σ = " if in_sigma > NEAR_SPECULAR - 1e-6 else ""
     remarks = [
         f"near-specular: the mirroring facet is tilted by less than {width}{brief(math.degrees(tilt), 2)}°"

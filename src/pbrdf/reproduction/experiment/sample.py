@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pbrdf.inversion.fit import FitResult, fit
+from pbrdf.inversion.fit import fit
+from pbrdf.inversion.result import FitResult
 from pbrdf.models import DoubleGauss
 from pbrdf.optics.stokes import dolp
 from pbrdf.reproduction.paper import SAMPLES

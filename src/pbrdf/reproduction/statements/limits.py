@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pbrdf.inversion.plausibility import directional_hemispherical_reflectance
 from pbrdf.models import DoubleGauss
+from pbrdf.models.reflectance import directional_hemispherical_reflectance
 from pbrdf.optics.fresnel import mueller_reflection
 from pbrdf.reproduction.interpretations import Reading
 from pbrdf.reproduction.plane import in_plane

@@ -1,0 +1,63 @@
+"""What a reader of a fit's numbers must know, in sentences."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pbrdf.inversion.observations import Observations
+from pbrdf.inversion.result import FitResult
+from pbrdf.inversion.solver import Solution, Status
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["notes_on"]
+
+
+def notes_on(
+    result: FitResult, dataset: xr.Dataset, data: Observations, solution: Solution, best: int
+) -> list[str]:
+    """Sentences on a fit: ``best`` is the number of its best start, ``data`` what was fitted."""
+    notes = []
+    if "wavelength" in dataset.coords:
+        wavelengths = np.unique(dataset["wavelength"].values)
+        by_wavelength = any(term.split == "wavelength" for term in result.space.terms)
+        if np.isfinite(wavelengths).sum() > 1 and not by_wavelength:
+            amplitude = next((p.name for p in result.model.parameters if p.amplitude), "a parameter")
+            notes.append(
+                f"One set of parameters was fitted to {len(wavelengths)} wavelengths at once; select one, or let "
+                f"{amplitude} be free for each, if the colour of the coating matters."
+            )
+    if not solution.converged[best]:
+        notes.append(
+            f"The best start did not converge ({Status(solution.status[best]).name.lower()}); raise the number "
+            "of iterations or of starts."
+        )
+    undetermined = [n for n, e in result.estimates.items() if e.verdict == "undetermined"]
+    if undetermined:
+        notes.append(
+            f"These data do not determine {', '.join(undetermined)}: the value shown is one of many that fit as "
+            "well; measure what it depends on, or fix it."
+        )
+    if not data.polarised:
+        notes.append(
+            "No polarisation was measured: the parameters and the model's DoLP rest on the intensity alone."
+        )
+    for name, e in result.estimates.items():
+        if e.verdict.startswith("at "):
+            bound = e.lower if "lower" in e.verdict else e.upper
+            notes.append(f"{name} stands {e.verdict} ({bound:g}); its standard error is not defined there.")
+    rivals = [o for o in result.optima[1:] if o.chi2 <= result.optima[0].chi2 + 4.0]
+    if rivals:
+        notes.append(
+            f"{len(rivals)} other optimum(s) fit nearly as well (χ² within 4): the solution is not unique."
+        )
+    reduced = result.goodness.reduced_chi2
+    if data.std_known and reduced > 2.0:
+        notes.append(
+            f"Reduced χ² is {reduced:.3g}: the model does not describe the data to their stated uncertainty, and "
+            "the standard errors are too small by about its square root."
+        )
+    return notes

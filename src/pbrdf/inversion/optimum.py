@@ -1,0 +1,58 @@
+"""The best fit of a model to data: what the analyses beyond the fit start from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pbrdf.inversion.estimates import Estimate
+from pbrdf.inversion.observations import Observations
+from pbrdf.inversion.problem import Space
+from pbrdf.inversion.statistics import Goodness
+from pbrdf.models.base import Model
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["Optimum"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Optimum:
+    """A model at the best fit to its data, with the curvature of χ² there.
+
+    Profiles, bootstrap, identifiability, error analysis and plausibility need no more than this;
+    :class:`~pbrdf.inversion.result.FitResult` is one that also tells how it was found.
+
+    Attributes
+    ----------
+    model
+        The model at the best optimum.
+    estimates
+        Every parameter by name.
+    goodness
+        χ², R², AIC, BIC over the fitted data.
+    comparison
+        Measured, modelled and residual values with their angles, on the scale of a BRDF; ``held_out`` and
+        ``near_specular`` mark geometries.
+    space, data
+        The free parameters and the fitted observations.
+    unknowns, information
+        The solver's unknowns at the optimum, shape (P,), and JᵀJ there, shape (P, P).
+    """
+
+    model: Model
+    estimates: dict[str, Estimate]
+    goodness: Goodness
+    comparison: xr.Dataset
+    space: Space = field(repr=False)
+    data: Observations = field(repr=False)
+    unknowns: np.ndarray = field(repr=False)
+    information: np.ndarray = field(repr=False)
+
+    @property
+    def std_known(self) -> bool:
+        """Whether the uncertainties came from the data set; if not, standard errors carry the residual scale."""
+        return self.data.std_known
