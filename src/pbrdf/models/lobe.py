@@ -20,8 +20,9 @@ _TILTS, _DIFFERENCE = np.geomspace(1e-4, 1.0, 600), math.radians(30.0)
 def measured_lobe_width(model: evaluation.Evaluable) -> float:
     """Slope standard deviation of the Gaussian whose half width at half maximum the specular lobe has at θ_d = 30°.
 
-    That is the tangent of θ_h at which the density of the facets, f00 cosθ_h cosθ_i cosθ_r of the specular part, has
-    fallen to half, divided by √(2 ln 2). For a long-tailed lobe it is the width of the core.
+    That is the tangent of θ_h at which the density of the facets' slopes, f00 cosθ_i cosθ_r cos⁴θ_h of the specular part
+    but for Fresnel reflectance and shadowing, has fallen to half, divided by √(2 ln 2). For a long-tailed lobe it is the
+    width of the core.
 
     Parameters
     ----------
@@ -37,7 +38,7 @@ def measured_lobe_width(model: evaluation.Evaluable) -> float:
     f00 = np.asarray(evaluation.stokes(model, theta_i, theta_r, phi, (1.0, 0.0, 0.0, 0.0), "specular"))[
         ..., 0
     ]
-    density = f00 * np.cos(_TILTS)[:, None] * np.cos(theta_i) * np.cos(theta_r)
+    density = f00 * np.cos(theta_i) * np.cos(theta_r) * np.cos(_TILTS)[:, None] ** 4
     return max(_half_width(column) for column in density.T)
 
 
