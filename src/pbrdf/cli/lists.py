@@ -49,10 +49,9 @@ def paints(as_json: AsJson = False) -> None:
 
 def models(as_json: AsJson = False) -> None:
     """List the models: their parameters with the bounds of a fit, and their options."""
-    from rich.table import Table
-
     from pbrdf.models import MODELS
     from pbrdf.report.numbers import brief
+    from pbrdf.report.printing import bare_table
 
     if as_json:
         content = {
@@ -78,7 +77,7 @@ def models(as_json: AsJson = False) -> None:
     console = output_console()
     for name, model in MODELS.items():
         console.print(f"[bold]{name}[/bold]")
-        table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+        table = bare_table()
         for title in ("  parameter", "meaning", "unit", "bounds of a fit", "if not fitted"):
             table.add_column(title)
         for p in model.parameters:

@@ -36,8 +36,9 @@ def plot(
     """Draw a model at one angle of incidence, or the points of a file of data."""
     from pbrdf.data.paints import PAINTS, load_paint
     from pbrdf.models import load_model
-    from pbrdf.report.fit.figures import data_figure, save_figure
+    from pbrdf.report.dataset.figure import data_figure
     from pbrdf.report.model.figure import model_figure
+    from pbrdf.report.style import save_figure
 
     target = output or Path(f"{Path(source).stem}.png")
     if target.exists() and target.resolve() == Path(source).resolve():
