@@ -8,7 +8,7 @@ from pbrdf.report.printing import bare_table
 from pbrdf.reproduction.page.page import verdicts_in_words
 from pbrdf.reproduction.page.tables import recovered
 from pbrdf.reproduction.paper import SAMPLES, SIMULATED
-from pbrdf.reproduction.run import Reproduction
+from pbrdf.reproduction.result import Reproduction
 from pbrdf.reproduction.statements.parameters import agreement
 from pbrdf.reproduction.statements.statement import signed
 
