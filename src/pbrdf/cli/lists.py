@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import json
-from typing import Annotated
-
-import typer
 
 from pbrdf.cli.console import output_console
+from pbrdf.cli.options import AsJson
 
 __all__ = ["models", "paints"]
 
 _SOURCE = "Zhang, Song, Zhao, Infrared and Laser Engineering 46(11), 1117002 (2017), Table 1"
 _SCALE = "the amplitude a is on that paper's camera scale: these paints reflect more than they receive"
-
-AsJson = Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")]
 
 
 def paints(as_json: AsJson = False) -> None:
