@@ -4,18 +4,23 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal, cast
+from typing import Annotated, Literal, cast
 
 import typer
 
 from pbrdf.cli.console import output_console, progress_bar, warn
 from pbrdf.cli.instruments import open_instrument
-from pbrdf.cli.reduce import open_regions
+from pbrdf.cli.options import (
+    DarkLevel,
+    output_option,
+    polarimeter_option,
+    quiet_option,
+    regions_option,
+    roi_option,
+)
+from pbrdf.cli.regions import open_regions
 from pbrdf.cli.values import require_folder_of
 from pbrdf.errors import PbrdfError
-
-if TYPE_CHECKING:
-    pass
 
 __all__ = ["calibrate"]
 
@@ -30,7 +35,7 @@ def calibrate(
     ],
     polarimeter: Annotated[
         str,
-        typer.Option("--polarimeter", "-p", help="The nominal instrument: its TOML file, or a built-in one."),
+        polarimeter_option("The nominal instrument: its TOML file, or a built-in one."),
     ],
     inputs: Annotated[
         Path,
@@ -44,12 +49,7 @@ def calibrate(
     ],
     output: Annotated[
         Path | None,
-        typer.Option(
-            "--output",
-            "-o",
-            help="File of the calibrated instrument.",
-            show_default="<frames>-calibrated.toml",
-        ),
+        output_option("File of the calibrated instrument.", show_default="<frames>-calibrated.toml"),
     ] = None,
     grid: Annotated[
         str | None,
@@ -87,17 +87,15 @@ def calibrate(
     ] = None,
     regions: Annotated[
         Path | None,
-        typer.Option(help="Regions that were lit evenly: TOML, CSV, or a picture of labels.", metavar="FILE"),
+        regions_option("Regions that were lit evenly"),
     ] = None,
     roi: Annotated[
         list[str] | None,
-        typer.Option(help="Such a region, as of `pbrdf reduce` (repeatable).", metavar="NAME=X0:X1,Y0:Y1"),
+        roi_option("Such a region, as of `pbrdf reduce` (repeatable)."),
     ] = None,
-    dark_level: Annotated[
-        float, typer.Option(help="Pixels whose mean signal is not above this count as dark, digital numbers.")
-    ] = 0.0,
+    dark_level: DarkLevel = 0.0,
     picture: Annotated[bool, typer.Option("--picture/--no-picture", help="Draw the errors.")] = True,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print the name of the file only.")] = False,
+    quiet: Annotated[bool, quiet_option("Print the name of the file only.")] = False,
 ) -> None:
     """Calibrate a polarimeter with frames of known light.
 

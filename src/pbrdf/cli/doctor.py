@@ -8,7 +8,7 @@ import sys
 import typer
 
 from pbrdf.cli.console import fail
-from pbrdf.cli.fit import Backend
+from pbrdf.cli.options import Backend
 from pbrdf.errors import BackendError
 
 __all__ = ["doctor"]

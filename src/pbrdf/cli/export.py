@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from pbrdf.cli.console import progress_bar, warn
-from pbrdf.cli.fit import Backend
-from pbrdf.cli.simulate import GRID, directions_of
+from pbrdf.cli.directions import GRID, directions_of
+from pbrdf.cli.options import Backend, NoProgressBar, angles_option, model_argument, output_option
 from pbrdf.cli.sources import known_wavelength, open_single_model
 from pbrdf.cli.values import require_folder_of
 from pbrdf.errors import PbrdfError
@@ -39,9 +39,7 @@ _REGIONS = {"hemisphere": "even over both hemispheres", "lobe": "in the lobe", "
 def export(
     sources: Annotated[
         list[str],
-        typer.Argument(
-            metavar="MODEL…", help="JSON files, folders of fits, or bundled paints: one for each wavelength."
-        ),
+        model_argument("Models' JSON files, folders of fits, or bundled paints: one for each wavelength."),
     ],
     format: Annotated[
         Format | None,
@@ -53,12 +51,7 @@ def export(
     ] = None,
     output: Annotated[
         Path | None,
-        typer.Option(
-            "--output",
-            "-o",
-            help="The new file: .pbsdf, .binary, .csv or .nc.",
-            show_default="<model>.<format>",
-        ),
+        output_option("The new file: .pbsdf, .binary, .csv or .nc.", show_default="<model>.<format>"),
     ] = None,
     wavelength: Annotated[
         list[float] | None,
@@ -66,18 +59,18 @@ def export(
     ] = None,
     theta_i: Annotated[
         str | None,
-        typer.Option(
-            help="csv, netcdf: angles of incidence, START:STOP:STEP or a list.", show_default=GRID["theta_i"]
+        angles_option(
+            "csv, netcdf: angles of incidence, START:STOP:STEP or a list.", show_default=GRID["theta_i"]
         ),
     ] = None,
     theta_r: Annotated[
-        str | None, typer.Option(help="csv, netcdf: viewing angles.", show_default=GRID["theta_r"])
+        str | None, angles_option("csv, netcdf: viewing angles.", show_default=GRID["theta_r"])
     ] = None,
     phi: Annotated[
         str | None,
-        typer.Option(help="csv, netcdf: azimuths, 0 in the forward half-plane.", show_default=GRID["phi"]),
+        angles_option("csv, netcdf: azimuths, 0 in the forward half-plane.", show_default=GRID["phi"]),
     ] = None,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress bar.")] = False,
+    quiet: NoProgressBar = False,
     backend: Backend = None,
 ) -> None:
     """Write models as files that renderers and other programs read.

@@ -9,7 +9,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from pbrdf.cli.console import output_console, progress_bar
-from pbrdf.cli.reading import Reading, with_reading_options
+from pbrdf.cli.options import (
+    Backend,
+    noise_option,
+    output_option,
+    quiet_option,
+    seed_option,
+    with_reading_options,
+)
+from pbrdf.cli.reading import Reading
 from pbrdf.cli.values import bounds as read_bounds
 from pbrdf.cli.values import numbers, pairs
 from pbrdf.errors import FitError, PbrdfError
@@ -17,11 +25,7 @@ from pbrdf.errors import FitError, PbrdfError
 if TYPE_CHECKING:
     from pbrdf.models import Model
 
-__all__ = ["Backend", "fit"]
-
-Backend = Annotated[
-    str | None, typer.Option(help="auto, llvm (processor) or cuda (GPU).", show_default="auto")
-]
+__all__ = ["fit"]
 
 
 @with_reading_options
@@ -60,10 +64,9 @@ def fit(
     starts: Annotated[int, typer.Option(help="Number of starts, spread over the bounds.")] = 64,
     noise: Annotated[
         str | None,
-        typer.Option(
-            help="Noise relative to the intensity, and absolute in units of its median, e.g. 0.02,0.01; or "
-            "equal; or instrument:linear=1%,circular=5%,read=0.5,quantum=1.",
-            metavar="REL[,ABS]",
+        noise_option(
+            "Noise relative to the intensity, and absolute in units of its median, e.g. 0.02,0.01; or equal; or "
+            "instrument:linear=1%,circular=5%,read=0.5,quantum=1.",
             show_default="the uncertainties in the data, else an assumption that is printed",
         ),
     ] = None,
@@ -129,13 +132,11 @@ def fit(
         str | None,
         typer.Option(help="Predict each fold from the others; folds by group, theta_i, angle or fraction."),
     ] = None,
-    seed: Annotated[int, typer.Option(help="Seed of the starts and of a held-out fraction.", min=0)] = 0,
+    seed: Annotated[int, seed_option("Seed of the starts and of a held-out fraction.")] = 0,
     output: Annotated[
         Path | None,
-        typer.Option(
-            "--output",
-            "-o",
-            help="Folder for the results; with several files, one folder each within it.",
+        output_option(
+            "Folder for the results; with several files, one folder each within it.",
             show_default="<file>-fit",
         ),
     ] = None,
@@ -144,9 +145,7 @@ def fit(
     verbose: Annotated[
         bool, typer.Option("--verbose", "-v", help="Show the full correlation matrix.")
     ] = False,
-    quiet: Annotated[
-        bool, typer.Option("--quiet", "-q", help="Print the names of the folders only.")
-    ] = False,
+    quiet: Annotated[bool, quiet_option("Print the names of the folders only.")] = False,
 ) -> None:
     """Fit a model to measured data, and say how well each parameter is known.
 

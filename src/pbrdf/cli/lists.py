@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import json
-from typing import Annotated
-
-import typer
 
 from pbrdf.cli.console import output_console
+from pbrdf.cli.options import AsJson
 
 __all__ = ["models", "paints"]
 
 _SOURCE = "Zhang, Song, Zhao, Infrared and Laser Engineering 46(11), 1117002 (2017), Table 1"
 _SCALE = "the amplitude a is on that paper's camera scale: these paints reflect more than they receive"
-
-AsJson = Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")]
 
 
 def paints(as_json: AsJson = False) -> None:
@@ -49,10 +45,9 @@ def paints(as_json: AsJson = False) -> None:
 
 def models(as_json: AsJson = False) -> None:
     """List the models: their parameters with the bounds of a fit, and their options."""
-    from rich.table import Table
-
     from pbrdf.models import MODELS
     from pbrdf.report.numbers import brief
+    from pbrdf.report.printing import bare_table
 
     if as_json:
         content = {
@@ -78,7 +73,7 @@ def models(as_json: AsJson = False) -> None:
     console = output_console()
     for name, model in MODELS.items():
         console.print(f"[bold]{name}[/bold]")
-        table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+        table = bare_table()
         for title in ("  parameter", "meaning", "unit", "bounds of a fit", "if not fitted"):
             table.add_column(title)
         for p in model.parameters:

@@ -15,10 +15,11 @@ from typer.core import TyperGroup
 
 import pbrdf
 from pbrdf.cli.calibrate import calibrate
+from pbrdf.cli.check import check
 from pbrdf.cli.console import fail
+from pbrdf.cli.convert import convert
 from pbrdf.cli.doctor import doctor
 from pbrdf.cli.export import export
-from pbrdf.cli.files import check, convert
 from pbrdf.cli.fit import fit
 from pbrdf.cli.lists import models, paints
 from pbrdf.cli.measure import measure

@@ -11,9 +11,21 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from pbrdf.cli.console import progress_bar, warn
-from pbrdf.cli.fit import Backend
 from pbrdf.cli.instruments import open_instrument
-from pbrdf.cli.sources import open_model
+from pbrdf.cli.options import (
+    CAMERA_POSITIONS,
+    Backend,
+    CalibrationError,
+    Patch,
+    WrittenWavelength,
+    angles_option,
+    instrument_option,
+    model_argument,
+    output_option,
+    seed_option,
+    source_radius_option,
+)
+from pbrdf.cli.sources import known_wavelength, open_model
 from pbrdf.cli.values import angles, number
 from pbrdf.errors import PbrdfError
 
@@ -23,30 +35,26 @@ if TYPE_CHECKING:
 
 __all__ = ["measure"]
 
-_POSITIONS = "60,80,100"
-
 
 def measure(
     sources: Annotated[
         list[str],
-        typer.Argument(
-            metavar="MODEL", help="Models' JSON files or bundled paints: samples side by side in the picture."
+        model_argument(
+            "Models' JSON files, folders of fits, or bundled paints: samples side by side in the picture."
         ),
     ],
-    output: Annotated[Path, typer.Option("--output", "-o", help="The new folder.")] = Path("measurement"),
+    output: Annotated[Path, output_option("The new folder.")] = Path("measurement"),
     positions: Annotated[
         str | None,
-        typer.Option(
-            help="Camera positions: bistatic angles between source and camera, degrees.",
-            metavar="ANGLES",
-            show_default=_POSITIONS,
+        angles_option(
+            "Camera positions: bistatic angles between source and camera, degrees.",
+            show_default=CAMERA_POSITIONS,
         ),
     ] = None,
     sample_angles: Annotated[
         str | None,
-        typer.Option(
-            help="Angles between the sample's surface and the source, degrees: START:STOP:STEP or a list.",
-            metavar="ANGLES",
+        angles_option(
+            "Angles between the sample's surface and the source, degrees: START:STOP:STEP or a list.",
             show_default="21 at each position, crowded to the mirror direction",
         ),
     ] = None,
@@ -58,15 +66,7 @@ def measure(
             metavar="FILE",
         ),
     ] = None,
-    instrument: Annotated[
-        str,
-        typer.Option(
-            "--instrument",
-            "--polarimeter",
-            help="paper, conservative, sony_imx250mzr, or an instrument's TOML file.",
-            metavar="NAME|FILE",
-        ),
-    ] = "paper",
+    instrument: Annotated[str, instrument_option()] = "paper",
     bits: Annotated[
         int | None,
         typer.Option(
@@ -81,16 +81,8 @@ def measure(
             metavar="each|common|NUMBER",
         ),
     ] = "each",
-    calibration_error: Annotated[
-        str,
-        typer.Option(
-            help="Errors of the instrument's stated accuracy: anew for each reading, fixed for all, or none.",
-            metavar="reading|fixed|none",
-        ),
-    ] = "reading",
-    source_radius: Annotated[
-        float, typer.Option(help="Angular radius of the source, degrees.", min=0.0)
-    ] = 0.0,
+    calibration_error: CalibrationError = "reading",
+    source_radius: Annotated[float, source_radius_option()] = 0.0,
     source_stability: Annotated[
         float | None,
         typer.Option(
@@ -114,14 +106,9 @@ def measure(
             help="Of the sample's tilt out of the plane of incidence at each geometry, degrees.", min=0.0
         ),
     ] = 0.0,
-    patch: Annotated[int, typer.Option(help="Side of the square of pixels that shows a sample.", min=1)] = 20,
-    wavelength: Annotated[
-        float | None,
-        typer.Option(
-            help="Wavelength to write down.", metavar="NM", show_default="476 of bundled paints, else none"
-        ),
-    ] = None,
-    seed: Annotated[int, typer.Option(help="Seed of all errors and noise.", min=0)] = 0,
+    patch: Patch = 20,
+    wavelength: WrittenWavelength = None,
+    seed: Annotated[int, seed_option("Seed of all errors and noise.")] = 0,
     backend: Backend = None,
 ) -> None:
     """Measure painted samples on a virtual goniometer: raw frames, and everything to reduce them.
@@ -134,7 +121,6 @@ def measure(
     Of a plan: `pbrdf measure white --angles plan.csv -o planned && pbrdf fit planned/white.nc`
     """
     import pbrdf
-    from pbrdf.data.paints import PAINTS, WAVELENGTH
     from pbrdf.instruments.goniometer.source import AngleErrors, Source
     from pbrdf.instruments.virtual.experiment import VirtualExperiment
     from pbrdf.instruments.virtual.measurement_folder import require_new, write_measurement
@@ -154,8 +140,8 @@ def measure(
             raise PbrdfError(f"two samples are called {name!r}: give each a name of its own")
         samples[name] = open_model(source)
     protocol = _protocol(positions, sample_angles, angle_table, taken.reference_angle)
-    if wavelength is None and all(source in PAINTS and not Path(source).exists() for source in sources):
-        wavelength = WAVELENGTH
+    if wavelength is None and len(known := {known_wavelength(source) for source in sources}) == 1:
+        (wavelength,) = known
     experiment = VirtualExperiment(
         protocol,
         taken,
@@ -203,7 +189,7 @@ def _protocol(
         if positions is not None or sample_angles is not None:
             raise PbrdfError("--angles holds every geometry: leave --positions and --sample-angles out")
         return Protocol.from_angle_table(read_angles(table), reference_angle=reference_angle)
-    between = np.deg2rad(angles(positions or _POSITIONS, "--positions"))
+    between = np.deg2rad(angles(positions or CAMERA_POSITIONS, "--positions"))
     turned = None if sample_angles is None else np.deg2rad(angles(sample_angles, "--sample-angles"))
     return Protocol.in_plane(between, turned)
 

@@ -9,8 +9,15 @@ from typing import Annotated
 import typer
 
 from pbrdf.cli.console import output_console, progress_bar
-from pbrdf.cli.fit import Backend
 from pbrdf.cli.instruments import open_instrument
+from pbrdf.cli.options import (
+    Backend,
+    instrument_option,
+    model_argument,
+    noise_option,
+    output_option,
+    seed_option,
+)
 from pbrdf.cli.sources import open_model
 from pbrdf.cli.values import numbers, require_folder_of, share
 from pbrdf.errors import PbrdfError
@@ -21,15 +28,11 @@ __all__ = ["plan"]
 def plan(
     source: Annotated[
         str,
-        typer.Argument(
-            metavar="MODEL", help="The guess: a model's JSON file, the folder of a fit, or a bundled paint."
-        ),
+        model_argument("The guess: a model's JSON file, the folder of a fit, or a bundled paint."),
     ],
     output: Annotated[
         Path,
-        typer.Option(
-            "--output", "-o", help="The angle table to write; a picture of the same name goes beside it."
-        ),
+        output_option("The angle table to write; a picture of the same name goes beside it."),
     ] = Path("plan.csv"),
     budget: Annotated[int, typer.Option(help="Number of readings.", min=1)] = 63,
     criterion: Annotated[
@@ -42,21 +45,11 @@ def plan(
         bool,
         typer.Option("--out-of-plane", help="Tilt the sample out of the plane of source and camera too."),
     ] = False,
-    instrument: Annotated[
-        str | None,
-        typer.Option(
-            "--instrument",
-            "--polarimeter",
-            help="paper, conservative, sony_imx250mzr, or an instrument's TOML file.",
-            metavar="NAME|FILE",
-            show_default="paper",
-        ),
-    ] = None,
+    instrument: Annotated[str | None, instrument_option(show_default="paper")] = None,
     noise: Annotated[
         str | None,
-        typer.Option(
-            help="Uncertainties as for `pbrdf fit` instead of an instrument, e.g. 0.02,0.001 or instrument:linear=1%.",
-            metavar="REL[,ABS]",
+        noise_option(
+            "Uncertainties as for `pbrdf fit` instead of an instrument, e.g. 0.02,0.001 or instrument:linear=1%."
         ),
     ] = None,
     uncertainty: Annotated[
@@ -99,7 +92,7 @@ def plan(
         float,
         typer.Option(help="Largest angle of source and camera to the normal, degrees.", min=1.0, max=89.0),
     ] = 80.0,
-    seed: Annotated[int, typer.Option(help="Seed of the search.", min=0)] = 0,
+    seed: Annotated[int, seed_option("Seed of the search.")] = 0,
     backend: Backend = None,
 ) -> None:
     """Choose where to measure: the angles that determine the parameters best.

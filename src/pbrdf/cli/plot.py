@@ -7,7 +7,9 @@ from typing import Annotated
 
 import typer
 
-from pbrdf.cli.reading import Reading, with_reading_options
+from pbrdf.cli.options import output_option, with_reading_options
+from pbrdf.cli.reading import Reading
+from pbrdf.cli.sources import is_paint
 from pbrdf.cli.values import require_folder_of
 from pbrdf.errors import PbrdfError
 
@@ -30,20 +32,21 @@ def plot(
     ] = None,
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", help="The figure: .png, .pdf or .svg.", show_default="<name>.png"),
+        output_option("The figure: .png, .pdf or .svg.", show_default="<name>.png"),
     ] = None,
 ) -> None:
     """Draw a model at one angle of incidence, or the points of a file of data."""
-    from pbrdf.data.paints import PAINTS, load_paint
+    from pbrdf.data.paints import load_paint
     from pbrdf.models import load_model
-    from pbrdf.report.fit.figures import data_figure, save_figure
+    from pbrdf.report.dataset.figure import data_figure
     from pbrdf.report.model.figure import model_figure
+    from pbrdf.report.style import save_figure
 
     target = output or Path(f"{Path(source).stem}.png")
     if target.exists() and target.resolve() == Path(source).resolve():
         raise PbrdfError(f"{target}: this is the file to draw; name another with --output")
     require_folder_of(target)
-    is_model = source.endswith(".json") or (source in PAINTS and not Path(source).exists())
+    is_model = source.endswith(".json") or is_paint(source)
     if is_model:
         if given := reading.stated():
             raise PbrdfError(

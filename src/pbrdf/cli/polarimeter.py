@@ -10,6 +10,7 @@ import typer
 
 from pbrdf.cli.console import output_console
 from pbrdf.cli.instruments import open_instrument
+from pbrdf.cli.options import output_option, seed_option
 from pbrdf.cli.values import angles, number, require_folder_of
 from pbrdf.errors import PbrdfError
 
@@ -32,9 +33,9 @@ def polarimeter(
         str, typer.Option(help="With --search: fast axes of the retarders, degrees.", metavar="A,B,…")
     ] = "0,45",
     starts: Annotated[int, typer.Option(help="With --search: random starts.", min=1)] = 24,
-    seed: Annotated[int, typer.Option(help="With --search: seed of the starts.", min=0)] = 0,
+    seed: Annotated[int, seed_option("With --search: seed of the starts.")] = 0,
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="With --search: TOML file for the instrument found.")
+        Path | None, output_option("With --search: TOML file for the instrument found.")
     ] = None,
 ) -> None:
     """Describe a polarimeter: analyser vectors, what they measure, figures of merit, accuracy.

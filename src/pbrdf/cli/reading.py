@@ -1,16 +1,11 @@
-"""The options that say how to read a file of data, shared by every command that reads one."""
+"""A file of data, read and cut down as the command line says."""
 
 from __future__ import annotations
 
-import functools
-import inspect
 import re
-from collections.abc import Callable
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
-
-import typer
+from typing import TYPE_CHECKING, Any
 
 from pbrdf.cli.values import number, pairs
 from pbrdf.errors import DataError, PbrdfError
@@ -19,10 +14,10 @@ if TYPE_CHECKING:
     import numpy as np
     import xarray as xr
 
-__all__ = ["Reading", "with_reading_options"]
+__all__ = ["SELECTABLE", "Reading"]
 
-_PANEL = "Reading the file"
-_SELECTABLE = ("group", "theta_i", "theta_r", "phi", "wavelength")
+#: What geometries can be selected by.
+SELECTABLE = ("group", "theta_i", "theta_r", "phi", "wavelength")
 #: Half the width within which a value that was asked for meets a measured one, degrees and nm.
 _TOLERANCE = {"wavelength": 0.5}
 _ANGLE_TOLERANCE = 0.05
@@ -121,8 +116,8 @@ def _selected(dataset: xr.Dataset, kind: str, text: str, source: str) -> xr.Data
     """The geometries with these values (``10,20``) or in this range (``0:80``) of a coordinate."""
     import numpy as np
 
-    if kind not in _SELECTABLE:
-        raise PbrdfError(f"--select: select by {', '.join(_SELECTABLE)}, not by {kind!r}")
+    if kind not in SELECTABLE:
+        raise PbrdfError(f"--select: select by {', '.join(SELECTABLE)}, not by {kind!r}")
     if kind not in dataset.coords:
         raise DataError(f"{source}: the data state no {kind} to select by")
     values = dataset[kind].values
@@ -152,104 +147,3 @@ def _within(values: np.ndarray, text: str, kind: str) -> np.ndarray:
         return (values >= low - tolerance) & (values <= high + tolerance)
     wanted = np.array([number(part, option) for part in text.split(",")])
     return (np.abs(values[:, None] - wanted) <= tolerance).any(axis=1)
-
-
-def _option(kind: Any, help: str, *names: str, metavar: str | None = None) -> Any:
-    return Annotated[kind, typer.Option(*names, help=help, metavar=metavar, rich_help_panel=_PANEL)]
-
-
-_OPTIONS: dict[str, tuple[Any, Any]] = {
-    "column": (
-        _option(
-            list[str] | None,
-            "The file's name for a column, e.g. I=f_r_per_sr, or a constant, e.g. phi==0 (repeatable).",
-            metavar="NAME=COLUMN",
-        ),
-        None,
-    ),
-    "where": (
-        _option(
-            list[str] | None, "Take only rows with this text in a column (repeatable).", metavar="COLUMN=TEXT"
-        ),
-        None,
-    ),
-    "select": (
-        _option(
-            list[str] | None,
-            f"Take only some geometries, e.g. theta_i=0:80 or group=1,2; by {', '.join(_SELECTABLE)}; "
-            "degrees and nm (repeatable).",
-            metavar="KIND=VALUES",
-        ),
-        None,
-    ),
-    "wavelength": (
-        _option(list[float] | None, "Take only this wavelength in nm (repeatable).", metavar="NM"),
-        None,
-    ),
-    "skip_invalid": (
-        _option(bool, "Leave out rows that hold no usable measurement.", "--skip-invalid"),
-        False,
-    ),
-    "format": (
-        _option(
-            str | None,
-            "csv, netcdf, zarr, scatmech, cornell, pbsdf or merl; found out by itself if not given.",
-        ),
-        None,
-    ),
-    "quantity": (
-        _option(
-            str | None,
-            "What the values are, if the file does not say: brdf, reflectance_factor, radiance, dn.",
-        ),
-        None,
-    ),
-    "azimuth": (_option(str | None, "Where the azimuth is 0: forward=0 or forward=180."), None),
-    "stokes": (_option(str | None, "What Q > 0 means: p-s or s-p."), None),
-    "illumination": (_option(str | None, "Stokes vector of the source: natural or I,Q,U,V."), None),
-    "cosine_weighted": (
-        _option(
-            bool | None,
-            "Whether the values are multiplied by cos θ_r.",
-            "--cosine-weighted/--not-cosine-weighted",
-        ),
-        None,
-    ),
-    "angles": (_option(str | None, "Unit of the file's angles: degrees or radians."), None),
-    "every": (
-        Annotated[
-            int | None,
-            typer.Option(
-                help="Of a .pbsdf or MERL table, take one node in this many along each angle; 1 is all of them.",
-                show_default="so many that at most 20 000 cells are left",
-                min=1,
-                metavar="N",
-                rich_help_panel=_PANEL,
-            ),
-        ],
-        None,
-    ),
-}
-
-
-def with_reading_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Give a command the options of :class:`Reading` in place of its parameter ``reading``."""
-    signature = inspect.signature(command, eval_str=True)
-    own = [p for p in signature.parameters.values() if p.name != "reading"]
-    added = [
-        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
-        for name, (annotation, default) in _OPTIONS.items()
-    ]
-
-    @functools.wraps(command)
-    def run(**given: Any) -> None:
-        options = {name: given.pop(name) for name in _OPTIONS}
-        for name in ("column", "where", "select", "wavelength"):
-            options[name] = list(options[name] or ())
-        command(reading=Reading(**options), **given)
-
-    # typer reads the command line from the signature, which must not be looked up in the wrapped function
-    del run.__wrapped__  # type: ignore[attr-defined]
-    run.__signature__ = inspect.Signature([*own, *added])  # type: ignore[attr-defined]
-    run.__annotations__ = {p.name: p.annotation for p in (*own, *added)}
-    return run

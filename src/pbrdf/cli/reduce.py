@@ -5,19 +5,25 @@ from __future__ import annotations
 import math
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from pbrdf.cli.console import output_console, progress_bar
 from pbrdf.cli.instruments import open_instrument
-from pbrdf.cli.values import number, pairs
+from pbrdf.cli.options import (
+    DarkLevel,
+    output_option,
+    polarimeter_option,
+    quiet_option,
+    regions_option,
+    roi_option,
+)
+from pbrdf.cli.regions import open_regions
+from pbrdf.cli.values import number
 from pbrdf.errors import PbrdfError
 
-if TYPE_CHECKING:
-    from pbrdf.instruments.reduction.regions import Region
-
-__all__ = ["open_regions", "reduce"]
+__all__ = ["reduce"]
 
 _UNITS = {"": 1, "K": 10**3, "M": 10**6, "G": 10**9, "T": 10**12}
 #: Less memory than this holds no block of a large picture.
@@ -33,29 +39,20 @@ def reduce(
             "series), a TIFF or NPY stack, netCDF, Zarr, or mosaic pictures.",
         ),
     ],
-    polarimeter: Annotated[
-        str,
-        typer.Option(
-            "--polarimeter",
-            "-p",
-            help="paper, conservative, sony_imx250mzr, or an instrument's TOML file.",
-            metavar="NAME|FILE",
-        ),
-    ],
+    polarimeter: Annotated[str, polarimeter_option()],
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", help="Folder for the results.", show_default="<frames>-reduced"),
+        output_option("Folder for the results.", show_default="<frames>-reduced"),
     ] = None,
     regions: Annotated[
         Path | None,
-        typer.Option(help="Regions to average over: TOML, CSV, or a picture of labels.", metavar="FILE"),
+        regions_option("Regions to average over"),
     ] = None,
     roi: Annotated[
         list[str] | None,
-        typer.Option(
-            help="A region in pixels of the Stokes picture, columns and rows from the top left: paint=100:200,150:260, "
-            "disc=ellipse:X,Y,RX,RY or edge=polygon:X,Y,X,Y,X,Y (repeatable).",
-            metavar="NAME=X0:X1,Y0:Y1",
+        roi_option(
+            "A region in pixels of the Stokes picture, columns and rows from the top left: paint=100:200,150:260, "
+            "disc=ellipse:X,Y,RX,RY or edge=polygon:X,Y,X,Y,X,Y (repeatable)."
         ),
     ] = None,
     angles: Annotated[
@@ -80,14 +77,12 @@ def reduce(
         bool,
         typer.Option("--weighted/--unweighted", help="Weigh the states of a pixel by their noise, or alike."),
     ] = True,
-    dark_level: Annotated[
-        float, typer.Option(help="Pixels whose mean signal is not above this count as dark, digital numbers.")
-    ] = 0.0,
+    dark_level: DarkLevel = 0.0,
     max_memory: Annotated[
         str,
         typer.Option(help="Memory for frames and what is computed from them, e.g. 200MB.", metavar="SIZE"),
     ] = "500MB",
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print the name of the folder only.")] = False,
+    quiet: Annotated[bool, quiet_option("Print the name of the folder only.")] = False,
 ) -> None:
     """Turn raw frames of a polarimeter into Stokes parameters with their uncertainty.
 
@@ -165,21 +160,6 @@ def reduce(
     shown = {name: means for name, means in result.averages.items() if name in chosen} or result.averages
     print_averages(shown, found.names, console)
     console.print(f"\nWritten to {folder}/: {', '.join(path.name for path in result.files)}", markup=False)
-
-
-def open_regions(file: Path | None, texts: list[str]) -> dict[str, Region]:
-    """Regions of --regions and --roi by name; raises PbrdfError if one is not understood or a name comes twice."""
-    from pbrdf.instruments.reduction.region_files import read_regions, region_from_text
-
-    found = {} if file is None else read_regions(file)
-    for name, text in pairs(texts, "--roi", "paint=100:200,150:260").items():
-        if name in found:
-            raise PbrdfError(f"--roi {name}: {file} has a region of that name too")
-        try:
-            found[name] = region_from_text(text)
-        except PbrdfError as error:
-            raise PbrdfError(f"--roi {name}: {error}") from error
-    return found
 
 
 def memory_size(text: str, option: str) -> int:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from pbrdf.cli.console import progress_bar, warn
+from pbrdf.cli.options import NoProgressBar, model_argument, output_option, seed_option
 from pbrdf.cli.values import require_folder_of
 from pbrdf.errors import PbrdfError
 
@@ -27,10 +28,8 @@ _MOST_ACROSS = 16_384
 def render(
     models: Annotated[
         list[str] | None,
-        typer.Argument(
-            metavar="MODEL",
-            help="Models' JSON files, folders of fits, or bundled paints: one object each (on the car: one piece).",
-            show_default=False,
+        model_argument(
+            "Models' JSON files, folders of fits, or bundled paints: one object each (on the car: one piece)."
         ),
     ] = None,
     scene: Annotated[str, typer.Option(help="sphere, plate, car, or a Mitsuba scene FILE.xml.")] = "sphere",
@@ -74,20 +73,15 @@ def render(
             metavar="ANGLE",
         ),
     ] = None,
-    seed: Annotated[int, typer.Option(help="Seed of the samples.", min=0)] = 0,
+    seed: Annotated[int, seed_option("Seed of the samples.")] = 0,
     variant: Annotated[
         str, typer.Option(help="Polarised variant of Mitsuba, e.g. cuda_ad_mono_polarized.")
     ] = "llvm_ad_mono_polarized",
     output: Annotated[
         Path | None,
-        typer.Option(
-            "--output",
-            "-o",
-            help="A folder, or FILE.exr: then one figure beside it.",
-            show_default="<scene>-render",
-        ),
+        output_option("A folder, or FILE.exr: then one figure beside it.", show_default="<scene>-render"),
     ] = None,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress bar.")] = False,
+    quiet: NoProgressBar = False,
 ) -> None:
     """Render painted objects as a polarisation camera sees them: S0 … S3, DoLP and AoLP.
 

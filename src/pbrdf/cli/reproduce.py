@@ -9,6 +9,16 @@ from typing import Annotated
 import typer
 
 from pbrdf.cli.console import output_console, stage_bar
+from pbrdf.cli.options import (
+    CAMERA_POSITIONS,
+    CalibrationError,
+    Patch,
+    angles_option,
+    output_option,
+    quiet_option,
+    seed_option,
+    source_radius_option,
+)
 from pbrdf.cli.values import angles, share
 from pbrdf.errors import PbrdfError
 
@@ -19,9 +29,7 @@ _NOISE = {"linear": "linear", "circular": "circular", "read": "read_noise", "sta
 
 
 def reproduce(
-    output: Annotated[Path, typer.Option("--output", "-o", help="Folder for the report.")] = Path(
-        "reproduction"
-    ),
+    output: Annotated[Path, output_option("Folder for the report.")] = Path("reproduction"),
     bits: Annotated[
         int,
         typer.Option(help="Of the camera's converter; the paper does not name its camera.", min=4, max=16),
@@ -37,24 +45,11 @@ def reproduce(
     ] = None,
     positions: Annotated[
         str,
-        typer.Option(
-            help="Bistatic angles of the three camera positions, degrees; the last one is predicted."
-        ),
-    ] = "60,80,100",
+        angles_option("Bistatic angles of the three camera positions, degrees; the last one is predicted."),
+    ] = CAMERA_POSITIONS,
     starts: Annotated[int, typer.Option(help="Starts of each inversion.", min=1)] = 64,
-    source_radius: Annotated[
-        float,
-        typer.Option(
-            help="Angular radius of the source in degrees; the inversion believes in a point.", min=0.0
-        ),
-    ] = 0.0,
-    calibration_error: Annotated[
-        str,
-        typer.Option(
-            help="The imager's calibration errs at each reading anew, fixed, or none.",
-            metavar="reading|fixed|none",
-        ),
-    ] = "reading",
+    source_radius: Annotated[float, source_radius_option("; the inversion believes in a point")] = 0.0,
+    calibration_error: CalibrationError = "reading",
     exposure: Annotated[
         str,
         typer.Option(
@@ -62,11 +57,9 @@ def reproduce(
             metavar="common|each",
         ),
     ] = "common",
-    seed: Annotated[int, typer.Option(help="Seed of noise and starts.", min=0)] = 0,
-    patch: Annotated[
-        int, typer.Option(help="Side of the square of pixels averaged for a sample.", min=1)
-    ] = 20,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print the name of the page only.")] = False,
+    seed: Annotated[int, seed_option("Seed of noise and starts.")] = 0,
+    patch: Patch = 20,
+    quiet: Annotated[bool, quiet_option("Print the name of the page only.")] = False,
 ) -> None:
     """Reproduce the paper on simulated data: its figures, its table 1 and a test of each of its statements.
 

@@ -10,7 +10,7 @@ from pbrdf.errors import PbrdfError
 if TYPE_CHECKING:
     from pbrdf.models import Model
 
-__all__ = ["known_wavelength", "open_model", "open_single_model"]
+__all__ = ["is_paint", "known_wavelength", "open_model", "open_single_model"]
 
 
 def open_model(source: str) -> Model:
@@ -24,7 +24,7 @@ def open_model(source: str) -> Model:
     from pbrdf.data.paints import PAINTS, load_paint
     from pbrdf.models import load_model
 
-    if _is_paint(source):
+    if is_paint(source):
         return load_paint(source)
     if source.lstrip().startswith("{"):
         return load_model(source)
@@ -54,10 +54,11 @@ def known_wavelength(source: str) -> float | None:
     """Wavelength in nm for which a source of :func:`open_model` is known to hold: that of the bundled paints."""
     from pbrdf.data.paints import WAVELENGTH
 
-    return WAVELENGTH if _is_paint(source) else None
+    return WAVELENGTH if is_paint(source) else None
 
 
-def _is_paint(source: str) -> bool:
+def is_paint(source: str) -> bool:
+    """Whether this names a bundled paint; a file of that name goes before."""
     from pbrdf.data.paints import PAINTS
 
     return source in PAINTS and not Path(source).exists()

@@ -11,9 +11,9 @@ from typing import Any
 import drjit as dr
 
 from pbrdf.backend import check_llvm
+from pbrdf.rendering.mitsuba_import import import_mitsuba
 from pbrdf.rendering.properties import PLUGIN, read_properties
 from pbrdf.rendering.surface import Surface
-from pbrdf.rendering.variant import import_mitsuba
 
 __all__ = ["register"]
 

@@ -5,19 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 from pbrdf.errors import BackendError
+from pbrdf.rendering.bsdf import register
+from pbrdf.rendering.mitsuba_import import import_mitsuba
+from pbrdf.rendering.sky_emitter import register_sky
 
-__all__ = ["DEFAULT_VARIANT", "import_mitsuba", "start_mitsuba"]
+__all__ = ["DEFAULT_VARIANT", "start_mitsuba"]
 
 DEFAULT_VARIANT = "llvm_ad_mono_polarized"
-
-
-def import_mitsuba() -> Any:
-    """The module ``mitsuba``; raises BackendError if it is not installed."""
-    try:
-        import mitsuba
-    except ImportError as error:
-        raise BackendError(f"rendering needs Mitsuba: pip install 'mitsuba>=3.9' ({error})") from error
-    return mitsuba
 
 
 def start_mitsuba(variant: str = DEFAULT_VARIANT) -> Any:
@@ -56,9 +50,6 @@ def start_mitsuba(variant: str = DEFAULT_VARIANT) -> Any:
         raise BackendError(
             f"Mitsuba cannot start {variant}: {error}. `pbrdf doctor` says what is missing"
         ) from error
-    from pbrdf.rendering.bsdf import register
-    from pbrdf.rendering.sky_emitter import register_sky
-
     register()
     register_sky()
     return mi

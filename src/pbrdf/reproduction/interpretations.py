@@ -1,4 +1,4 @@
-"""The readings of the paper's eqs (12)-(13) that are put side by side, and the paper's models under each."""
+"""The interpretations of the paper's eqs (12)-(13) that are put side by side, and the paper's models under each."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from pbrdf.data.paints import PAINTS
 from pbrdf.models import DoubleGauss
 from pbrdf.reproduction.paper import FIGURE_3_PARAMETERS
 
-__all__ = ["DEFAULT", "LITERAL", "READINGS", "Reading"]
+__all__ = ["DEFAULT", "INTERPRETATIONS", "LITERAL", "Interpretation"]
 
 
 @dataclass(frozen=True)
-class Reading:
-    """One reading.
+class Interpretation:
+    """One interpretation, called a reading on the page.
 
     Attributes
     ----------
@@ -47,10 +47,10 @@ class Reading:
         return DoubleGauss(*FIGURE_3_PARAMETERS, **self.options)
 
 
-#: All readings, the default of the models first, the letter of the paper last.
-READINGS = tuple(
-    Reading(normalization, transmittance)
+#: All interpretations, the default of the models first, the letter of the paper last.
+INTERPRETATIONS = tuple(
+    Interpretation(normalization, transmittance)
     for normalization in DoubleGauss.options["normalization"]
     for transmittance in DoubleGauss.options["transmittance"]
 )
-DEFAULT, LITERAL = READINGS[0], READINGS[-1]
+DEFAULT, LITERAL = INTERPRETATIONS[0], INTERPRETATIONS[-1]

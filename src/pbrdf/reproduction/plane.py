@@ -30,7 +30,7 @@ def in_plane(model: Model, theta_i: ArrayLike, theta_r: ArrayLike, part: str = "
     """
     theta_i, theta_r = np.broadcast_arrays(np.asarray(theta_i, dtype=float), np.asarray(theta_r, dtype=float))
     phi = np.where(np.where(theta_i < 0.0, -theta_r, theta_r) < 0.0, np.pi, 0.0)
-    # the total as the sum of its parts: the specular kernel then serves all readings
+    # the total as the sum of its parts: the specular kernel then serves all interpretations
     parts = ("specular", "diffuse") if part == "total" else (part,)
     return np.sum([model.stokes(np.abs(theta_i), np.abs(theta_r), phi, part=p) for p in parts], axis=0)
 

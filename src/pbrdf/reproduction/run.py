@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 from pbrdf.data.paints import load_paint
@@ -12,35 +11,14 @@ from pbrdf.data.readers import write
 from pbrdf.reproduction.experiment.measurement import Options, measured_samples
 from pbrdf.reproduction.experiment.sample import Sample, invert
 from pbrdf.reproduction.paper import SIMULATED
-from pbrdf.reproduction.statements.catalogue import Evaluated, evaluate
-from pbrdf.reproduction.statements.expected import Number, expected_numbers
+from pbrdf.reproduction.result import Reproduction
+from pbrdf.reproduction.statements.catalogue import evaluate
+from pbrdf.reproduction.statements.expected import expected_numbers
 
-__all__ = ["Reproduction", "reproduce", "write_reproduction"]
+__all__ = ["reproduce", "write_reproduction"]
 
 #: Called with the name of the stage, the pieces of it that are done, and all of them.
 Progress = Callable[[str, int, int], None]
-
-
-@dataclass(frozen=True)
-class Reproduction:
-    """Everything that was found.
-
-    Attributes
-    ----------
-    options
-        How the experiment was simulated and inverted.
-    samples
-        The five samples, measured and inverted.
-    statements
-        The paper's statements with what their tests found.
-    numbers
-        Numbers expected of the model.
-    """
-
-    options: Options
-    samples: list[Sample]
-    statements: list[Evaluated]
-    numbers: list[Number]
 
 
 def reproduce(options: Options, progress: Progress | None = None) -> Reproduction:

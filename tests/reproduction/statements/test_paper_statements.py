@@ -1,4 +1,4 @@
-"""What the paper says, tested on every reading of its equations: numbers and verdicts."""
+"""What the paper says, tested on every interpretation of its equations: numbers and verdicts."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 
 import independent as ref
 from pbrdf.data.paints import PAINTS
-from pbrdf.reproduction.interpretations import DEFAULT, LITERAL, READINGS, Reading
+from pbrdf.reproduction.interpretations import DEFAULT, INTERPRETATIONS, LITERAL, Interpretation
 from pbrdf.reproduction.statements.catalogue import PRINTED, RECOVERED, STATEMENTS, evaluate
 from pbrdf.reproduction.statements.expected import expected_numbers
 from pbrdf.reproduction.statements.intensity import diffuse_intensity_falls, narrow_peaks, peaks_alike
@@ -25,7 +25,7 @@ from pbrdf.reproduction.statements.polarisation import (
 )
 from pbrdf.reproduction.statements.statement import Kind
 
-#: Statements about the model that each reading contradicts, at bistatic angles of 60°, 80°, 100°.
+#: Statements about the model that each interpretation contradicts, at bistatic angles of 60°, 80°, 100°.
 CONTRADICTED = {
     "weighted / flux": {10},
     "weighted / amplitude": {10, 11},
@@ -34,17 +34,17 @@ CONTRADICTED = {
 }
 
 
-@pytest.mark.parametrize("reading", READINGS, ids=lambda r: r.name)
-def test_each_reading_contradicts_these_statements_and_no_others(reproduction, reading):
-    tested = {e.statement.number: e for e in reproduction.statements if reading.name in e.outcomes}
+@pytest.mark.parametrize("interpretation", INTERPRETATIONS, ids=lambda r: r.name)
+def test_each_interpretation_contradicts_these_statements_and_no_others(reproduction, interpretation):
+    tested = {e.statement.number: e for e in reproduction.statements if interpretation.name in e.outcomes}
     assert set(tested) == {1, 2, 3, 4, 6, 9, 10, 11, 13, 15, 16, 17, 18, 19}
-    failed = {number for number, e in tested.items() if not e.outcomes[reading.name].passed}
-    assert failed == CONTRADICTED[reading.name]
+    failed = {number for number, e in tested.items() if not e.outcomes[interpretation.name].passed}
+    assert failed == CONTRADICTED[interpretation.name]
 
 
-def test_the_default_is_the_reading_that_contradicts_least():
-    assert Reading("weighted", "flux") == DEFAULT
-    assert Reading("visible", "amplitude") == LITERAL
+def test_the_default_is_the_interpretation_that_contradicts_least():
+    assert Interpretation("weighted", "flux") == DEFAULT
+    assert Interpretation("visible", "amplitude") == LITERAL
     assert min(CONTRADICTED, key=lambda name: len(CONTRADICTED[name])) == DEFAULT.name
 
 
@@ -75,7 +75,7 @@ def test_numbers_worked_out_beforehand_are_met_but_for_one():
     """All but the zeros of sample 3 beside the peak: 7.4° on the near side where 6° to 7° were expected."""
     rows = expected_numbers()
     outside = [row for row in rows if not row.within]
-    assert {(row.statement, row.reading) for row in outside} == {(18, DEFAULT.name)}
+    assert {(row.statement, row.interpretation) for row in outside} == {(18, DEFAULT.name)}
     for row in outside:
         assert "sample 3" in row.quantity
         assert row.found[0] == pytest.approx(7.43, abs=0.02)
@@ -129,9 +129,9 @@ def test_10_peaks_are_alike_where_the_bistatic_angles_are_small():
 
 
 def test_11_amplitudes_contradict_the_text_in_both_normalizations(positions):
-    for reading in READINGS:
-        outcome = diffuse_intensity_falls(reading, positions)
-        assert outcome.passed == (reading.transmittance == "flux")
+    for interpretation in INTERPRETATIONS:
+        outcome = diffuse_intensity_falls(interpretation, positions)
+        assert outcome.passed == (interpretation.transmittance == "flux")
         assert len(outcome.value) == 5
 
 

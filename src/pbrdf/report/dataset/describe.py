@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,15 +14,7 @@ from pbrdf.data.select import measured_channels
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pbrdf.models.parameters import Parameter
-
-__all__ = [
-    "cautions",
-    "describe",
-    "illumination_in_words",
-    "shown_unit",
-    "wavelengths_in_words",
-]
+__all__ = ["cautions", "describe", "illumination_in_words", "short_name", "wavelengths_in_words"]
 
 _QUANTITIES = {
     "brdf": "BRDF, 1/sr",
@@ -53,6 +46,12 @@ def describe(ds: xr.Dataset) -> list[str]:
         f"{_covariances_in_words(ds)}"
     )
     return lines
+
+
+def short_name(name: str, dataset: xr.Dataset) -> str:
+    """What to call data in a title: the file's name and the wavelengths."""
+    wavelengths = wavelengths_in_words(dataset)
+    return Path(name).name + (f", {wavelengths}" if wavelengths.endswith("nm") else "")
 
 
 def cautions(ds: xr.Dataset) -> list[str]:
@@ -96,11 +95,6 @@ def _covariances_in_words(ds: xr.Dataset) -> str:
     largest = np.abs(correlations(values)[:, i, j]).max()
     where = "" if rows.all() else f" at {rows.sum()} geometries"
     return f" and their covariances{where} (correlations up to {largest:.2g})"
-
-
-def shown_unit(parameter: Parameter) -> tuple[float, str]:
-    """Factor and unit in which people and files see a parameter: angles in degrees."""
-    return (180.0 / np.pi, "°") if parameter.unit == "rad" else (1.0, parameter.unit)
 
 
 def _listed(names: list[str]) -> str:

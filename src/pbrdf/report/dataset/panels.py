@@ -1,4 +1,4 @@
-"""The panels that figures are made of: each draws one channel into one pair of axes."""
+"""The panel of measured points, and what the panels of other figures share with it: axes, scales, remarks."""
 
 from __future__ import annotations
 
@@ -7,24 +7,28 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pbrdf.report.dataset.cuts import Cut
-from pbrdf.report.dataset.points import Channel, Points
+from pbrdf.report.dataset.points import Points
+from pbrdf.report.dataset.shown_cuts import ShownCuts
 from pbrdf.report.numbers import brief
-from pbrdf.report.style import GREY, Look
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 __all__ = [
     "LOGARITHMIC_FROM",
+    "PANEL_SIZE",
     "VIEWING_ANGLE",
-    "agreement_panel",
     "channel_label",
+    "cut_axis_label",
     "cut_panel",
-    "difference_panel",
     "dress_hemisphere",
+    "point_label",
+    "remark",
+    "scale_intensity",
 ]
 
+#: Width and height of a panel of points, inches.
+PANEL_SIZE = (4.5, 2.8)
 #: Decades from which on an intensity is drawn on a logarithmic axis.
 LOGARITHMIC_FROM = 1.5
 #: Decades up to which a logarithmic axis has labels at 1, 2 and 5.
@@ -33,23 +37,15 @@ _FEW_DECADES = 2.5
 _FROM_ZERO = 0.4
 #: Part of the value that 95 % exceed, below which a logarithmic axis does not reach.
 _DARK = 0.2
-#: With more points than this the markers are small and see-through.
-_MANY_POINTS = 300
 
 VIEWING_ANGLE = "viewing angle θr (°), negative on the source's side"
 _INCIDENCE = "angle of incidence θi (°)"
 
 
 def cut_panel(
-    ax: Axes,
-    points: Points,
-    cuts: list[Cut],
-    looks: list[Look],
-    name: str,
-    channel: Channel,
-    curves: list[np.ndarray] | None,
+    ax: Axes, points: Points, shown: ShownCuts, name: str, held_out: np.ndarray | None = None
 ) -> None:
-    """One channel against the angle: points with error bars, the model as lines.
+    """One channel against the angle: points with error bars.
 
     Parameters
     ----------
@@ -57,26 +53,16 @@ def cut_panel(
         Where to draw.
     points
         All points.
-    cuts, looks
-        What to draw, and how.
-    name, channel
-        ``"intensity"`` or ``"dolp"``, and its values.
-    curves
-        The model along each cut's path; None without a model.
+    shown
+        The cuts to draw.
+    name
+        ``"intensity"`` or ``"dolp"``.
+    held_out
+        Points to draw with open markers, shape (G,); None for none.
     """
-    for i, (cut, look) in enumerate(zip(cuts, looks, strict=True)):
-        held = points.held_out[cut.rows]
-        if curves is not None:
-            line, width = ("--", 2.0) if held.all() else ("-", 1.4)
-            ax.plot(
-                cut.path_x,
-                curves[i],
-                color=look.colour,
-                linestyle=line,
-                linewidth=width,
-                label="model",
-                zorder=2,
-            )
+    channel = points.channels[name]
+    for cut, look in zip(shown.cuts, shown.looks, strict=True):
+        held = np.zeros(cut.rows.shape, dtype=bool) if held_out is None else held_out[cut.rows]
         for chosen, filled in ((~held, True), (held, False)):
             rows = cut.rows[chosen]
             if not rows.size:
@@ -90,95 +76,20 @@ def cut_panel(
                 color=look.colour,
                 markerfacecolor=look.colour if filled else "white",
                 elinewidth=0.8,
-                label=_label_of_points(filled),
+                label=point_label(filled),
                 zorder=3,
             )
-        if points.diffuse is not None:
-            used = points.diffuse[cut.rows]
-            ax.plot(
-                cut.x[used],
-                channel.measured[cut.rows[used]],
-                "o",
-                color="white",
-                markersize=2.0,
-                label="diffuse step",
-                zorder=4,
-            )
-    ax.set_xlabel(_INCIDENCE if cuts[0].kind == "theta_r" else VIEWING_ANGLE)
+    ax.set_xlabel(cut_axis_label(shown))
     ax.set_ylabel(channel_label(name, points))
     if name == "intensity":
-        _scale_intensity(ax, channel.measured[np.concatenate([cut.rows for cut in cuts])])
+        scale_intensity(ax, channel.measured[np.concatenate([cut.rows for cut in shown.cuts])])
     else:
         ax.set_ylim(0.0, min(ax.get_ylim()[1], 1.05))
 
 
-def difference_panel(
-    ax: Axes, points: Points, cuts: list[Cut], looks: list[Look], name: str, channel: Channel
-) -> None:
-    """Model − measured against the angle, relative for the intensity; parameters as of :func:`cut_panel`."""
-    differences = channel.modelled - channel.measured
-    if name == "intensity":
-        with np.errstate(divide="ignore", invalid="ignore"):
-            differences = np.where(channel.measured > 0.0, 100.0 * differences / channel.measured, np.nan)
-    ax.axhline(0.0, color="black", linewidth=0.8, zorder=1)
-    for cut, look in zip(cuts, looks, strict=True):
-        held = points.held_out[cut.rows]
-        for chosen, filled in ((~held, True), (held, False)):
-            if chosen.any():
-                ax.plot(
-                    cut.x[chosen],
-                    differences[cut.rows[chosen]],
-                    look.marker,
-                    color=look.colour,
-                    markerfacecolor=look.colour if filled else "white",
-                    label=_label_of_points(filled),
-                )
-    rows = np.concatenate([cut.rows for cut in cuts])
-    _limit_differences(ax, differences[rows], " %" if name == "intensity" else "")
-    ax.set_xlabel(_INCIDENCE if cuts[0].kind == "theta_r" else VIEWING_ANGLE)
-    ax.set_ylabel("relative difference of intensity (%)" if name == "intensity" else "difference of DoLP")
-
-
-def agreement_panel(ax: Axes, points: Points, looks: dict[str, Look], name: str, channel: Channel) -> None:
-    """Modelled against measured values of all points, with the line of equality.
-
-    Parameters
-    ----------
-    ax, points, name, channel
-        As of :func:`cut_panel`.
-    looks
-        How to draw each group.
-    """
-    many = points.theta_i.size > _MANY_POINTS
-    usable = np.isfinite(channel.measured) & np.isfinite(channel.modelled)
-    if name == "intensity":
-        usable &= channel.measured > 0.0
-    for filled in (True, False):  # the few that were held out are drawn over the many that were not
-        for group, look in looks.items():
-            chosen = usable & (points.group == group) & (points.held_out != filled)
-            if chosen.any():
-                ax.plot(
-                    channel.measured[chosen],
-                    channel.modelled[chosen],
-                    look.marker,
-                    color=look.colour,
-                    markerfacecolor=look.colour if filled else "white",
-                    markersize=3.0 if many else 4.5,
-                    markeredgewidth=0.7,
-                    alpha=0.6 if many else 1.0,
-                    label=_label_of_points(filled),
-                )
-    values = np.concatenate([channel.measured[usable], channel.modelled[usable]])
-    ends = np.array([values.min(), values.max()]) if values.size else np.array([0.0, 1.0])
-    ax.plot(ends, ends, color="black", linewidth=0.9, zorder=4, label="equal")
-    if name == "intensity":
-        for factor in (0.8, 1.25):
-            ax.plot(ends, factor * ends, color=GREY, linewidth=0.8, linestyle=":", zorder=4, label="25 % off")
-        ax.annotate("dotted: 25 % apart", (0.97, 0.04), xycoords="axes fraction", ha="right", fontsize=8.5)
-        _scale_intensity(ax, channel.measured, channel.modelled)
-    label = channel_label(name, points)
-    ax.set_xlabel(f"measured {label}")
-    ax.set_ylabel(f"modelled {label}")
+def cut_axis_label(shown: ShownCuts) -> str:
+    """Name of the angle along the cuts, for an axis."""
+    return _INCIDENCE if shown.cuts[0].kind == "theta_r" else VIEWING_ANGLE
 
 
 def dress_hemisphere(ax: Any) -> None:
@@ -196,11 +107,12 @@ def channel_label(name: str, points: Points) -> str:
     return "intensity (arbitrary scale)" if points.arbitrary_scale else "intensity (1/sr)"
 
 
-def _label_of_points(filled: bool) -> str:
+def point_label(filled: bool) -> str:
+    """What filled and open markers stand for."""
     return "measured" if filled else "held out"
 
 
-def _scale_intensity(ax: Axes, measured: np.ndarray, modelled: np.ndarray | None = None) -> None:
+def scale_intensity(ax: Axes, measured: np.ndarray, modelled: np.ndarray | None = None) -> None:
     """Scale the axis to what was drawn: logarithmic if that spans decades, else from 0 if it comes near 0.
 
     With modelled values too, both axes. What the axes leave out is counted in the panel.
@@ -226,7 +138,7 @@ def _scale_intensity(ax: Axes, measured: np.ndarray, modelled: np.ndarray | None
     lost = int((measured < lowest).sum())
     if lost:
         limit = f"below {brief(floor, 2)}" if floor >= positive.min() else "≤ 0"
-        _remark(ax, f"{lost} measured value{'s' if lost > 1 else ''} {limit} not shown")
+        remark(ax, f"{lost} measured value{'s' if lost > 1 else ''} {limit} not shown")
 
 
 def _label_within_decades(axis: Any) -> None:
@@ -238,21 +150,7 @@ def _label_within_decades(axis: Any) -> None:
     axis.set_minor_formatter(NullFormatter())
 
 
-def _limit_differences(ax: Axes, differences: np.ndarray, unit: str) -> None:
-    """Limits symmetric about 0; if a few values are far out, without them, and says so."""
-    size = np.abs(differences[np.isfinite(differences)])
-    if not size.size or size.max() == 0.0:
-        return
-    usual = float(np.quantile(size, 0.95)) * 1.5
-    limit = 1.1 * float(size.max()) if size.max() <= 2.0 * usual else usual
-    ax.set_ylim(-limit, limit)
-    beyond = int((size > limit).sum())
-    if beyond:
-        count = f"{beyond} value{'s' if beyond > 1 else ''}"
-        _remark(ax, f"{count} beyond the axis, up to {brief(float(size.max()), 3)}{unit}")
-
-
-def _remark(ax: Axes, text: str) -> None:
+def remark(ax: Axes, text: str) -> None:
     """A remark in the lower left corner, readable over points."""
     ax.annotate(
         text,

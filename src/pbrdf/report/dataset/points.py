@@ -1,4 +1,4 @@
-"""Measured points, with the modelled ones beside them, as the figures draw them."""
+"""Measured points as the figures draw them."""
 
 from __future__ import annotations
 
@@ -14,9 +14,7 @@ from pbrdf.data.select import to_brdf_scale
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pbrdf.report.fit.subject import Report
-
-__all__ = ["Channel", "Points", "dolp_uncertainty"]
+__all__ = ["Channel", "Points", "dolp_uncertainty", "error_correlation"]
 
 
 @dataclass(frozen=True)
@@ -25,13 +23,12 @@ class Channel:
 
     Attributes
     ----------
-    measured, std, modelled
-        Shape (G,). ``modelled`` is all NaN where there is no model.
+    measured, std
+        Values and their standard uncertainties, shape (G,).
     """
 
     measured: np.ndarray
     std: np.ndarray
-    modelled: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -44,69 +41,29 @@ class Points:
         Degrees, shape (G,); φ within −180 … 180.
     group
         Labels as text, shape (G,).
-    held_out
-        Whether a fit left the point out, shape (G,).
     intensity, dolp
         Intensity on the scale of a BRDF and degree of linear polarisation; ``dolp`` is None if it was not
         measured.
     arbitrary_scale
         Whether the intensity has an unknown constant factor.
-    diffuse
-        Whether a stepwise fit used the point for its diffuse step, shape (G,); None without such a step.
     """
 
     theta_i: np.ndarray
     theta_r: np.ndarray
     phi: np.ndarray
     group: np.ndarray
-    held_out: np.ndarray
     intensity: Channel
     dolp: Channel | None
     arbitrary_scale: bool
-    diffuse: np.ndarray | None = None
 
-    @classmethod
-    def from_fit(cls, report: Report) -> Points:
-        """The points of a fit, with the model's values."""
-        comparison = report.result.comparison
-        bare = cls.from_dataset(report.dataset)
-        nothing = np.full(bare.theta_i.shape, np.nan)
-
-        # Noise that the fit had to assume is no uncertainty of the measurement: no bars are drawn of it.
-        stated = report.result.std_known or report.settings.get("noise") is not None
-
-        def column(name: str) -> np.ndarray:
-            known = name in comparison and (stated or not name.endswith("_std"))
-            return comparison[name].values if known else nothing
-
-        dolp = None
-        if bare.dolp is not None:
-            std = column("dolp_std")
-            if "dolp_std" not in comparison and "I_std" in comparison:
-                q, u = ("Q", "U") if "Q_std" in comparison else ("m10", "m20")
-                std = dolp_uncertainty(
-                    *(column(f"{name}_measured") for name in ("I", q, u)),
-                    *(column(f"{name}_std") for name in ("I", q, u)),
-                    correlation=None
-                    if report.result.data.correlation is None
-                    else _correlation(report.dataset),
-                )
-            dolp = Channel(column("dolp_measured"), std, column("dolp_modelled"))
-        return cls(
-            theta_i=bare.theta_i,
-            theta_r=bare.theta_r,
-            phi=bare.phi,
-            group=bare.group,
-            held_out=comparison["held_out"].values,
-            intensity=Channel(column("I_measured"), column("I_std"), column("I_modelled")),
-            dolp=dolp,
-            arbitrary_scale=bare.arbitrary_scale,
-            diffuse=comparison["used_for_diffuse"].values if "used_for_diffuse" in comparison else None,
-        )
+    @property
+    def channels(self) -> dict[str, Channel]:
+        """What was measured, by name: ``"intensity"`` and, if it was measured, ``"dolp"``."""
+        return {"intensity": self.intensity} | ({} if self.dolp is None else {"dolp": self.dolp})
 
     @classmethod
     def from_dataset(cls, dataset: xr.Dataset) -> Points:
-        """The points of a data set, without a model."""
+        """The points of a data set."""
         ds = to_brdf_scale(dataset)
         nothing = np.full(ds.sizes["geometry"], np.nan)
 
@@ -122,25 +79,25 @@ class Points:
             std = [column(f"{name}_std") for name in "IQU"]
         dolp = None
         if "dolp" in ds:
-            dolp = Channel(column("dolp"), column("dolp_std"), nothing)
+            dolp = Channel(column("dolp"), column("dolp_std"))
         elif np.isfinite(stokes[1]).any():
             with np.errstate(divide="ignore", invalid="ignore"):
                 value = np.hypot(stokes[1], np.nan_to_num(stokes[2])) / stokes[0]
-            dolp = Channel(value, dolp_uncertainty(*stokes, *std, correlation=_correlation(ds)), nothing)
+            dolp = Channel(value, dolp_uncertainty(*stokes, *std, correlation=error_correlation(ds)))
         phi = np.rad2deg(ds["phi"].values)
         return cls(
             theta_i=np.rad2deg(ds["theta_i"].values),
             theta_r=np.rad2deg(ds["theta_r"].values),
             phi=180.0 - (180.0 - phi) % 360.0,
             group=ds["group"].values.astype(str),
-            held_out=np.zeros(nothing.shape, dtype=bool),
-            intensity=Channel(stokes[0], std[0], nothing),
+            intensity=Channel(stokes[0], std[0]),
             dolp=dolp,
             arbitrary_scale=ds.attrs.get("scale") == "arbitrary",
         )
 
 
-def _correlation(ds: xr.Dataset) -> np.ndarray | None:
+def error_correlation(ds: xr.Dataset) -> np.ndarray | None:
+    """Correlation of the errors of I, Q, U and V, shape (G, 4, 4); None where the data state no covariances."""
     return correlations(ds[COVARIANCE].values) if COVARIANCE in ds.data_vars else None
 
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from pbrdf.report.dataset.describe import shown_unit
+from pbrdf.report.numbers import shown_unit
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from pbrdf.report.dataset.describe import shown_unit
-from pbrdf.report.fit.figures import short_name
-from pbrdf.report.numbers import brief
+from pbrdf.report.dataset.describe import short_name
+from pbrdf.report.numbers import brief, shown_unit
 from pbrdf.report.style import BLUE, GREY, panels, styled
 
 if TYPE_CHECKING:

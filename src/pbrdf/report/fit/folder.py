@@ -15,10 +15,9 @@ import numpy as np
 import pbrdf
 from pbrdf.data.formats.storage import exact_degrees, name_beside
 from pbrdf.errors import DataError
-from pbrdf.report.dataset.describe import shown_unit
 from pbrdf.report.fit.subject import Report
 from pbrdf.report.fit.summary import summary_text
-from pbrdf.report.numbers import plain
+from pbrdf.report.numbers import plain, shown_unit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -83,7 +82,9 @@ def write_report(report: Report, directory: Path, *, figure_format: str = "png")
         If the folder cannot be written.
     """
     from pbrdf.report.fit.contour_figure import contour_figure
-    from pbrdf.report.fit.figures import fit_figure, save_figure, starts_figure
+    from pbrdf.report.fit.figure import fit_figure
+    from pbrdf.report.fit.starts_figure import starts_figure
+    from pbrdf.report.style import save_figure
 
     names = ["summary.txt", f"figure.{figure_format}", "model.json", "fit.json", "comparison.nc"]
     names.append(f"starts.{figure_format}")

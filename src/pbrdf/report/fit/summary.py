@@ -12,9 +12,10 @@ import numpy as np
 from pbrdf.inversion.comparison import NEAR_SPECULAR, near_specular_tilt
 from pbrdf.inversion.estimates import Estimate
 from pbrdf.inversion.result import FitResult
-from pbrdf.report.dataset.describe import cautions, illumination_in_words, shown_unit, wavelengths_in_words
+from pbrdf.report.dataset.describe import cautions, illumination_in_words, wavelengths_in_words
 from pbrdf.report.fit.subject import Report
-from pbrdf.report.numbers import brief, per_cent, with_error
+from pbrdf.report.numbers import brief, per_cent, shown_unit, with_error
+from pbrdf.report.printing import bare_table, print_parts
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
@@ -75,8 +76,7 @@ def print_summary(report: Report, console: Console, *, verbose: bool = False) ->
     verbose
         Also the full correlation matrix.
     """
-    for part in _parts(report, verbose, wide=console.width >= _NARROW):
-        console.print(part)
+    print_parts(_parts(report, verbose, wide=console.width >= _NARROW), console)
 
 
 def _parts(report: Report, verbose: bool, wide: bool) -> Iterator[RenderableType]:
@@ -139,9 +139,7 @@ def _check_parts(checks: Checks, result: FitResult, verbose: bool) -> Iterator[R
 
 def _interval_table(checks: Checks, result: FitResult) -> Table:
     """Intervals of the free parameters by every method that was used."""
-    from rich.table import Table
-
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    table = bare_table()
     table.add_column("parameter")
     table.add_column("± 1.96 standard errors")
     if checks.profile is not None:
@@ -214,10 +212,9 @@ def _channels(result: FitResult) -> str:
 
 def _headed(rows: list[tuple[str, list[str]]]) -> Table:
     """Lines of text, each block with a word in the margin."""
-    from rich.table import Table
     from rich.text import Text
 
-    table = Table(box=None, show_header=False, pad_edge=False, padding=(0, 2, 0, 0))
+    table = bare_table(header=False)
     table.add_column(no_wrap=True, style="bold", width=11)
     table.add_column(overflow="fold")
     for head, lines in rows:
@@ -227,10 +224,9 @@ def _headed(rows: list[tuple[str, list[str]]]) -> Table:
 
 
 def _parameter_table(result: FitResult, wide: bool) -> Table:
-    from rich.table import Table
     from rich.text import Text
 
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    table = bare_table()
     table.add_column("parameter", no_wrap=True)
     if wide:
         table.add_column("meaning", overflow="fold", min_width=24)
@@ -374,10 +370,8 @@ def optima_in_words(result: FitResult) -> list[str]:
 
 
 def _correlation_table(result: FitResult) -> Table:
-    from rich.table import Table
-
     names = [str(n) for n in result.correlation["parameter"].values]
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    table = bare_table()
     table.add_column("correlation")
     for name in names:
         table.add_column(name, justify="right")
@@ -388,10 +382,8 @@ def _correlation_table(result: FitResult) -> Table:
 
 def _error_table(result: FitResult) -> Table:
     """Errors model − measured by region, of what was fitted and of what was predicted."""
-    from rich.table import Table
-
     polarised = any(math.isfinite(p.dolp_rms) for p in (*result.fitted.values(), *result.predicted.values()))
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    table = bare_table()
     table.add_column("errors,\nmodel − measured", no_wrap=True)
     table.add_column("\nnumber", justify="right")
     heads = ["intensity\nmedian", "\nrms", "\nlargest", *(["DoLP\nrms", "\nlargest"] if polarised else [])]

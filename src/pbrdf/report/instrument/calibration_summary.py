@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,11 +13,13 @@ from pbrdf.data.formats.storage import atomic_target
 from pbrdf.instruments.calibration.known_inputs import Calibration
 from pbrdf.instruments.calibration.settings_calibration import ModelCalibration
 from pbrdf.optics.stokes import STOKES, aolp, docp, dolp
-from pbrdf.report.instrument.polarimeter_summary import merit_table, plain_table, vector_table
+from pbrdf.report.instrument.polarimeter_summary import merit_table, vector_table
 from pbrdf.report.numbers import brief, per_cent, with_error
+from pbrdf.report.printing import plain_table, print_parts
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
+    from rich.table import Table
 
     from pbrdf.instruments.calibration.instrument_calibration import InstrumentCalibration
 
@@ -29,8 +31,7 @@ _NO_ANGLE = 0.05
 
 def print_calibration(made: InstrumentCalibration, console: Console) -> None:
     """Print the analyser vectors or settings, the accuracy beside the nominal instrument's, and figures of merit."""
-    for part in _parts(made):
-        console.print(part, markup=False) if isinstance(part, str) else console.print(part)
+    print_parts(_parts(made), console)
 
 
 def _parts(made: InstrumentCalibration) -> Iterator[RenderableType]:
@@ -67,7 +68,7 @@ def _parts(made: InstrumentCalibration) -> Iterator[RenderableType]:
     yield f"Residual of the readings: {per_cent(found.residual)} of their mean."
 
 
-def _settings(found: ModelCalibration) -> Any:
+def _settings(found: ModelCalibration) -> Table:
     table = plain_table(
         "settings (angles and retardances in degrees)", "setting", "nominal", "fitted", "change"
     )
@@ -82,7 +83,7 @@ def _settings(found: ModelCalibration) -> Any:
     return table
 
 
-def _accuracy(made: InstrumentCalibration) -> Any:
+def _accuracy(made: InstrumentCalibration) -> RenderableType:
     own, nominal = made.calibration.accuracy, made.nominal_accuracy
     if own is None or nominal is None:
         return "No accuracy: no input was held out."

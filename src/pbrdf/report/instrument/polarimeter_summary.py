@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pbrdf.instruments.polarimeter.merit import merit
 from pbrdf.optics.stokes import STOKES
 from pbrdf.report.numbers import brief, per_cent, with_error
+from pbrdf.report.printing import plain_table
 
 if TYPE_CHECKING:
     from rich.console import Console
+    from rich.table import Table
 
     from pbrdf.instruments.polarimeter.instrument import Instrument
     from pbrdf.instruments.polarimeter.polarimeter import Polarimeter
 
-__all__ = ["merit_table", "plain_table", "print_polarimeter", "vector_table"]
+__all__ = ["merit_table", "print_polarimeter", "vector_table"]
 
 
 def print_polarimeter(instrument: Instrument, console: Console) -> None:
@@ -46,18 +48,7 @@ def print_polarimeter(instrument: Instrument, console: Console) -> None:
     )
 
 
-def plain_table(title: str, *columns: str) -> Any:
-    """A table with a title, the first column of words, the others of numbers."""
-    from rich.box import SIMPLE_HEAD
-    from rich.table import Table
-
-    table = Table(box=SIMPLE_HEAD, title=title, title_justify="left")
-    for k, name in enumerate(columns):
-        table.add_column(name, justify="right" if k else "left")
-    return table
-
-
-def vector_table(polarimeter: Polarimeter, covariance: np.ndarray | None = None) -> Any:
+def vector_table(polarimeter: Polarimeter, covariance: np.ndarray | None = None) -> Table:
     """A table of analyser vectors, with standard errors (covariance (N, 4, 4)); of a map mean and range over cells."""
     W = polarimeter.analyzer
     words = ", mean (least…largest) over the field" if polarimeter.is_map else ""
@@ -78,7 +69,7 @@ def vector_table(polarimeter: Polarimeter, covariance: np.ndarray | None = None)
     return table
 
 
-def merit_table(instruments: dict[str, Polarimeter]) -> Any:
+def merit_table(instruments: dict[str, Polarimeter]) -> Table:
     """Figures of merit of polarimeters of as many states side by side; of a map the median and the worst cell.
 
     The best possible ones are those of perfect analysers spread evenly over the Poincaré sphere (Foreman & Goudail,

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pbrdf.report.numbers import brief
+from pbrdf.report.printing import plain_table, print_parts
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
@@ -29,14 +30,10 @@ def print_plan(plan: Plan, console: Console, *, reference: str = "3 × 21") -> N
     reference
         What the protocol that it is compared with is called.
     """
-    for part in _parts(plan, reference):
-        console.print(part)
+    print_parts(_parts(plan, reference), console)
 
 
 def _parts(plan: Plan, reference: str) -> Iterator[RenderableType]:
-    from rich.box import SIMPLE_HEAD
-    from rich.table import Table
-
     readings = len(plan.protocol)
     yield (
         f"{readings} readings at {int((plan.counts > 0).sum())} geometries, {plan.criterion}-optimal among "
@@ -45,9 +42,9 @@ def _parts(plan: Plan, reference: str) -> Iterator[RenderableType]:
     yield f"Uncertainties: {plan.noise}"
     if not plan.angle_error:
         yield "The angles are taken as exact, which for a narrow lobe no goniometer is."
-    table = Table(box=SIMPLE_HEAD, title="expected standard errors", title_justify="left")
-    for name in ("parameter", "guess", "this plan", f"plan {reference}", "ratio"):
-        table.add_column(name, justify="left" if name == "parameter" else "right")
+    table = plain_table(
+        "expected standard errors", "parameter", "guess", "this plan", f"plan {reference}", "ratio"
+    )
     rows = zip(plan.names, plan.values, plan.std, plan.reference_std, strict=True)
     for name, value, own, other in rows:
         table.add_row(name, brief(value), brief(own, 2), brief(other, 2), f"{other / own:.2f}")

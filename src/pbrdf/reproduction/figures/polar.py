@@ -9,8 +9,8 @@ import numpy as np
 from pbrdf.models import Model
 from pbrdf.optics.stokes import dolp
 from pbrdf.report.dataset.panels import VIEWING_ANGLE
-from pbrdf.report.style import DISTINCT_COLOURS, GREY, RED, looks_of, styled
-from pbrdf.reproduction.interpretations import DEFAULT, READINGS
+from pbrdf.report.style import GREY, RED, looks_of, styled
+from pbrdf.reproduction.interpretations import DEFAULT, INTERPRETATIONS
 from pbrdf.reproduction.paper import FIGURE_3_INCIDENCE, SIMULATED
 from pbrdf.reproduction.plane import zero_crossings
 from pbrdf.reproduction.statements.polarisation import figure_3_cut
@@ -29,7 +29,7 @@ _PAPER = {"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 1.0}
 
 
 def polar_figure() -> Figure:
-    """Figure 3 with its parameters: the surfaces in the default reading, the cuts in all readings."""
+    """Figure 3 with its parameters: the surfaces in the default interpretation, the cuts in all of them."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -140,12 +140,12 @@ def _dress(ax: Axes) -> None:
 def _intensity_cut(ax: Axes) -> None:
     theta_r = _grid()
     degrees = np.rad2deg(theta_r)
-    for look, line, reading in zip(
-        looks_of(min(len(READINGS), DISTINCT_COLOURS)), _LINES, READINGS, strict=True
+    for look, line, interpretation in zip(
+        looks_of(len(INTERPRETATIONS)), _LINES, INTERPRETATIONS, strict=True
     ):
-        values, _ = figure_3_cut(reading.figure_3(), theta_r)
-        ax.plot(degrees, values, color=look.colour, linestyle=line, label=reading.name)
-        if reading == DEFAULT:
+        values, _ = figure_3_cut(interpretation.figure_3(), theta_r)
+        ax.plot(degrees, values, color=look.colour, linestyle=line, label=interpretation.name)
+        if interpretation == DEFAULT:
             peak = int(values.argmax())
             ax.plot(degrees[peak], values[peak], "v", color=look.colour, markersize=7)
             ax.annotate(
@@ -168,12 +168,14 @@ def _intensity_cut(ax: Axes) -> None:
 def _polarisation_cut(ax: Axes) -> None:
     theta_r = _grid()
     degrees = np.rad2deg(theta_r)
-    for look, line, reading in zip(looks_of(len(READINGS)), _LINES, READINGS, strict=True):
-        _, q = figure_3_cut(reading.figure_3(), theta_r)
+    for look, line, interpretation in zip(
+        looks_of(len(INTERPRETATIONS)), _LINES, INTERPRETATIONS, strict=True
+    ):
+        _, q = figure_3_cut(interpretation.figure_3(), theta_r)
         ax.plot(degrees, np.abs(q), color=look.colour, linestyle=line)
         zeros = np.rad2deg(zero_crossings(theta_r, q))
         ax.plot(zeros, np.zeros_like(zeros), "o", color=look.colour, markersize=5, clip_on=False, zorder=5)
-        if reading != DEFAULT:
+        if interpretation != DEFAULT:
             continue
         for zero in zeros:
             ax.annotate(

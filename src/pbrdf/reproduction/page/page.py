@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterator, Sequence
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pbrdf
 from pbrdf.report.numbers import brief
@@ -22,12 +21,10 @@ from pbrdf.reproduction.page.page_tables import (
 )
 from pbrdf.reproduction.page.pieces import figure, page, paragraph
 from pbrdf.reproduction.page.tables import recovered
+from pbrdf.reproduction.result import Reproduction
 from pbrdf.reproduction.statements.catalogue import Evaluated
 from pbrdf.reproduction.statements.parameters import agreement
 from pbrdf.reproduction.statements.statement import Kind
-
-if TYPE_CHECKING:
-    from pbrdf.reproduction.run import Reproduction
 
 __all__ = ["page_text", "verdicts_in_words"]
 
@@ -46,15 +43,15 @@ def page_text(reproduction: Reproduction, folder: Path) -> str:
 
 
 def verdicts_in_words(statements: Sequence[Evaluated]) -> list[str]:
-    """How many statements hold in the default reading, which fail, and how the letter of the paper does."""
+    """How many statements hold under the default interpretation, which fail, and how the letter of the paper does."""
     lines = []
-    for reading, what in ((DEFAULT, "default reading"), (LITERAL, "letter of eqs (12), (13)")):
-        tested = [e for e in statements if reading.name in e.outcomes]
-        failed = [e.statement.number for e in tested if not e.outcomes[reading.name].passed]
+    for interpretation, what in ((DEFAULT, "default reading"), (LITERAL, "letter of eqs (12), (13)")):
+        tested = [e for e in statements if interpretation.name in e.outcomes]
+        failed = [e.statement.number for e in tested if not e.outcomes[interpretation.name].passed]
         shown = ", ".join(f"#{n}" for n in failed)
         lines.append(
-            f"{reading.name} ({what}): {len(tested) - len(failed)} of {len(tested)} statements about the model hold"
-            + (f"; {shown} fail{'s' if len(failed) == 1 else ''}." if failed else ".")
+            f"{interpretation.name} ({what}): {len(tested) - len(failed)} of {len(tested)} statements about the model "
+            "hold" + (f"; {shown} fail{'s' if len(failed) == 1 else ''}." if failed else ".")
         )
     on_parameters = [
         (e.statement.number, name, outcome)

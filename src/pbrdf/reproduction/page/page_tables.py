@@ -12,7 +12,7 @@ from pbrdf.report.numbers import brief, with_error
 from pbrdf.reproduction import paper
 from pbrdf.reproduction.experiment.errors import error_numbers, position_errors
 from pbrdf.reproduction.experiment.sample import Sample
-from pbrdf.reproduction.interpretations import READINGS
+from pbrdf.reproduction.interpretations import INTERPRETATIONS
 from pbrdf.reproduction.page.pieces import table, verdict
 from pbrdf.reproduction.page.tables import recovered
 from pbrdf.reproduction.statements.catalogue import PRINTED, RECOVERED, Evaluated
@@ -116,7 +116,7 @@ def strongest_table(samples: Sequence[Sample]) -> str:
 
 
 def statement_table(statements: Sequence[Evaluated]) -> str:
-    """The statements with their outcomes in every reading."""
+    """The statements with their outcomes under every interpretation."""
     rows: list[list[str | None]] = []
     for entry in statements:
         statement = entry.statement
@@ -136,11 +136,13 @@ def statement_table(statements: Sequence[Evaluated]) -> str:
                 None,
             ]
         else:
-            row += [_outcome(entry.outcomes[reading.name], "<br>") for reading in READINGS]
+            row += [
+                _outcome(entry.outcomes[interpretation.name], "<br>") for interpretation in INTERPRETATIONS
+            ]
         rows.append(row)
     return table(
         "What the paper says, how it is tested, and what the model does in each reading.",
-        ["#", "statement", *(reading.name for reading in READINGS)],
+        ["#", "statement", *(interpretation.name for interpretation in INTERPRETATIONS)],
         rows,
     )
 
@@ -164,7 +166,7 @@ def number_table(numbers: Sequence[Number]) -> str:
             [
                 str(n.statement),
                 escape(n.quantity),
-                n.reading,
+                n.interpretation,
                 joined(n.expected),
                 f"± {n.tolerance:.2g}",
                 joined(n.found),

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from pbrdf.report.printing import bare_table
 from pbrdf.reproduction.page.page import verdicts_in_words
 from pbrdf.reproduction.page.tables import recovered
 from pbrdf.reproduction.paper import SAMPLES, SIMULATED
-from pbrdf.reproduction.run import Reproduction
+from pbrdf.reproduction.result import Reproduction
 from pbrdf.reproduction.statements.parameters import agreement
 from pbrdf.reproduction.statements.statement import signed
 
@@ -19,11 +20,9 @@ __all__ = ["print_summary"]
 
 def print_summary(reproduction: Reproduction, console: Console) -> None:
     """Print what was simulated, the recovered parameters with (recovered − true)/standard error, and the statements."""
-    from rich.table import Table
-
     samples = reproduction.samples
     console.print(f"{SIMULATED}\n{reproduction.options.in_words()}\n", markup=False)
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    table = bare_table()
     table.add_column("", no_wrap=True)
     for r in recovered(samples[0]):
         table.add_column(r.symbol, justify="right", no_wrap=True)

@@ -200,7 +200,7 @@ def _number(number: Number) -> Row:
     return {
         "statement": number.statement,
         "quantity": number.quantity,
-        "reading": number.reading,
+        "reading": number.interpretation,
         "expected": joined(number.expected),
         "tolerance": number.tolerance,
         "found": joined(number.found),

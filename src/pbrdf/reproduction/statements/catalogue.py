@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from pbrdf.data.paints import PAINTS
 from pbrdf.reproduction.experiment.sample import Sample
-from pbrdf.reproduction.interpretations import READINGS
+from pbrdf.reproduction.interpretations import INTERPRETATIONS
 from pbrdf.reproduction.statements.intensity import (
     diffuse_intensity_falls,
     local_incidence_grows,
@@ -235,8 +235,8 @@ class Evaluated:
     statement
         The statement.
     outcomes
-        By the name of the reading; for statements on parameters by :data:`PRINTED` and :data:`RECOVERED`; empty where
-        nothing was tested.
+        By the name of the interpretation; for statements on parameters by :data:`PRINTED` and :data:`RECOVERED`; empty
+        where nothing was tested.
     """
 
     statement: Statement
@@ -263,7 +263,7 @@ def evaluate(
     for done, statement in enumerate(STATEMENTS, start=1):
         outcomes: dict[str, Outcome] = {}
         if statement.test is not None:
-            outcomes = {reading.name: statement.test(reading, positions) for reading in READINGS}
+            outcomes = {each.name: statement.test(each, positions) for each in INTERPRETATIONS}
         elif statement.number in _ON_PARAMETERS:
             test, name = _ON_PARAMETERS[statement.number]
             column = ("sigma", "n", "a", "k", "b", "t").index(name)

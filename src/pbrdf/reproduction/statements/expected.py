@@ -1,6 +1,6 @@
 """Numbers worked out from the paper's equations beforehand, beside those of the model.
 
-They are a check of the model and of the readings, not of the paper, which prints none of them. Those "of a flat
+They are a check of the model and of the interpretations, not of the paper, which prints none of them. Those "of a flat
 coating" let body light leave through a level surface (σ → 0 in D_v); at the paper's σ the facets move them a
 little, which the text says where it shows.
 """
@@ -14,7 +14,7 @@ import numpy as np
 
 from pbrdf.models import Model
 from pbrdf.optics.stokes import dolp
-from pbrdf.reproduction.interpretations import READINGS, Reading
+from pbrdf.reproduction.interpretations import INTERPRETATIONS, Interpretation
 from pbrdf.reproduction.paper import FIGURE_3_INCIDENCE
 from pbrdf.reproduction.plane import in_plane, offsets, turned, zero_crossings
 from pbrdf.reproduction.statements.intensity import DIFFUSE_AT
@@ -37,15 +37,15 @@ class Number:
         Number of the statement that it belongs to.
     quantity
         What it is, with its unit.
-    reading
-        Name of the reading.
+    interpretation
+        Name of the interpretation of the equations.
     expected, tolerance, found
         Expected and found numbers of the same length.
     """
 
     statement: int
     quantity: str
-    reading: str
+    interpretation: str
     expected: tuple[float, ...]
     tolerance: float
     found: tuple[float, ...]
@@ -75,16 +75,18 @@ def expected_numbers() -> list[Number]:
 def _number(
     statement: int,
     quantity: str,
-    reading: Reading,
+    interpretation: Interpretation,
     expected: Sequence[float],
     tolerance: float,
     found: Sequence[float] | np.ndarray,
 ) -> Number:
-    return Number(statement, quantity, reading.name, tuple(expected), tolerance, tuple(map(float, found)))
+    return Number(
+        statement, quantity, interpretation.name, tuple(expected), tolerance, tuple(map(float, found))
+    )
 
 
 def _diffuse_dop() -> Iterator[Number]:
-    default, amplitude = READINGS[0], READINGS[1]
+    default, amplitude = INTERPRETATIONS[0], INTERPRETATIONS[1]
     yield _number(
         1,
         "θr (°) where the diffuse light of samples 1 … 5 is 10 % polarised",
@@ -94,14 +96,14 @@ def _diffuse_dop() -> Iterator[Number]:
         ten_per_cent_angles(default.samples()),
     )
     theta_r = np.deg2rad([30.0, 45.0, 60.0, 70.0, 80.0])
-    for reading, expected in (
+    for interpretation, expected in (
         (default, (1.5, 3.7, 7.8, 12.0, 16.3)),
         (amplitude, (1.7, 4.5, 10.1, 16.6, 26.7)),
     ):
-        flat = reading.sample(3).replace(sigma=_FLAT)
+        flat = interpretation.sample(3).replace(sigma=_FLAT)
         found = 100.0 * dolp(in_plane(flat, np.deg2rad(10.0), theta_r, "diffuse"))
         quantity = "diffuse DoP (%) of sample 3 at θr = 30, 45, 60, 70, 80°, flat coating"
-        yield _number(1, quantity, reading, expected, 0.06, found)
+        yield _number(1, quantity, interpretation, expected, 0.06, found)
 
 
 def _figure_3() -> Iterator[Number]:
@@ -122,14 +124,15 @@ def _figure_3() -> Iterator[Number]:
         zeros = np.rad2deg(zero_crossings(theta_r, q))
         return zeros[[0, -1]] if len(zeros) else np.full(2, np.nan)
 
-    weighted, amplitude, visible, literal = READINGS
-    for reading, zeros, tolerance in (
+    weighted, amplitude, visible, literal = INTERPRETATIONS
+    for interpretation, zeros, tolerance in (
         (weighted, (-3.45, 64.35), 0.05),
         (amplitude, (-2.6, 54.05), 0.05),
         (visible, (-2.4, 58.5), 0.1),
     ):
         quantity = "figure 3: zeros of the DoP (°), flat coating"
-        yield _number(4, quantity, reading, zeros, tolerance, outer_zeros(cut(reading.figure_3(), flat=True)))
+        found = outer_zeros(cut(interpretation.figure_3(), flat=True))
+        yield _number(4, quantity, interpretation, zeros, tolerance, found)
     full = cut(weighted.figure_3(), flat=False)
     yield _number(
         4,
@@ -139,17 +142,17 @@ def _figure_3() -> Iterator[Number]:
         0.02,
         outer_zeros(full),
     )
-    for reading, (degree, angle) in (
+    for interpretation, (degree, angle) in (
         (weighted, (0.205, 46.0)),
         (amplitude, (0.118, 39.5)),
         (visible, (0.137, 42.0)),
     ):
-        q = cut(reading.figure_3(), flat=True)
+        q = cut(interpretation.figure_3(), flat=True)
         peak = int(np.argmax(np.where(near, -q, -np.inf)))
         yield _number(
             4,
             "figure 3: largest DoP near specular (%), flat coating",
-            reading,
+            interpretation,
             (100 * degree,),
             0.1,
             (-100 * q[peak],),
@@ -157,7 +160,7 @@ def _figure_3() -> Iterator[Number]:
         yield _number(
             4,
             "figure 3: angle of that maximum (°)",
-            reading,
+            interpretation,
             (angle,),
             0.5,
             (float(np.rad2deg(theta_r[peak])),),
@@ -174,11 +177,11 @@ def _figure_3() -> Iterator[Number]:
 
 
 def _peaks() -> Iterator[Number]:
-    model = READINGS[0].sample(3)
+    model = INTERPRETATIONS[0].sample(3)
     half = 0.5 * _BISTATIC
     found = in_plane(model, half, half)[:, 0] * np.cos(half)
     quantity = "f cosθi of sample 3 in the mirror direction at Ψ = 30, 50, 70, 90°"
-    yield _number(10, quantity, READINGS[0], (1.91, 1.99, 2.19, 2.70), 0.0101, found)
+    yield _number(10, quantity, INTERPRETATIONS[0], (1.91, 1.99, 2.19, 2.70), 0.0101, found)
 
 
 def _diffuse_ratios() -> Iterator[Number]:
@@ -189,20 +192,20 @@ def _diffuse_ratios() -> Iterator[Number]:
         (0.78, 0.70, 0.75, 0.46, 0.88),
         (1.17, 1.02, 1.10, 0.61, 1.22),
     )
-    for reading, expected in zip(READINGS, table, strict=True):
-        pairs = [in_plane(m, theta_i, [near, far], "diffuse")[:, 0] for m in reading.samples()]
+    for interpretation, expected in zip(INTERPRETATIONS, table, strict=True):
+        pairs = [in_plane(m, theta_i, [near, far], "diffuse")[:, 0] for m in interpretation.samples()]
         quantity = "diffuse intensity at θr = 60° over that at 20°, θi = 10°, samples 1 … 5"
-        yield _number(11, quantity, reading, expected, 0.0101, [b / a for a, b in pairs])
+        yield _number(11, quantity, interpretation, expected, 0.0101, [b / a for a, b in pairs])
 
 
 def _maxima() -> Iterator[Number]:
-    reading, turn, half = READINGS[0], offsets(9.0), 0.5 * _BISTATIC
-    model = reading.sample(3)
+    interpretation, turn, half = INTERPRETATIONS[0], offsets(9.0), 0.5 * _BISTATIC
+    model = interpretation.sample(3)
     fresnel = dolp(in_plane(model, half, half, "specular"))
     yield _number(
         16,
         "DoP of the facets alone, sample 3, Ψ = 30, 50, 70, 90°",
-        reading,
+        interpretation,
         (0.087, 0.248, 0.495, 0.785),
         5.1e-4,
         fresnel,
@@ -211,7 +214,7 @@ def _maxima() -> Iterator[Number]:
     yield _number(
         16,
         "largest DoP of sample 3 at Ψ = 30, 50, 70, 90°",
-        reading,
+        interpretation,
         (0.066, 0.194, 0.409, 0.694),
         0.0015,
         best,
@@ -219,34 +222,34 @@ def _maxima() -> Iterator[Number]:
     theta = np.deg2rad(np.arange(50.0, 70.0, 0.05))
     found = [
         float(np.rad2deg(theta[dolp(in_plane(m, theta, theta, "specular")).argmax()]))
-        for m in reading.samples()
+        for m in interpretation.samples()
     ]
     expected = (60.9, 59.4, 58.3, 59.9, 60.1)
-    yield _number(16, "Brewster angle (°) of samples 1 … 5", reading, expected, 0.08, found)
+    yield _number(16, "Brewster angle (°) of samples 1 … 5", interpretation, expected, 0.08, found)
 
 
 def _zeros() -> Iterator[Number]:
     """Zeros beside the peak were expected at 6° to 7° (sample 3) and 1.4° (sample 1)."""
-    reading, turn = READINGS[0], offsets(12.0)
+    interpretation, turn = INTERPRETATIONS[0], offsets(12.0)
     for number, middle, tolerance in ((1, 1.4, 0.15), (3, 6.5, 0.5)):
         for psi in np.deg2rad([50.0, 70.0]):
-            (stokes,) = in_plane(reading.sample(number), *turned(psi, turn))
+            (stokes,) = in_plane(interpretation.sample(number), *turned(psi, turn))
             zeros = np.abs(np.rad2deg(zero_crossings(turn, stokes[:, 1] / stokes[:, 0])))
             quantity = f"zeros of the DoP left and right of the peak (°), sample {number}, Ψ = {np.rad2deg(psi):.0f}°"
-            yield _number(18, quantity, reading, (middle, middle), tolerance, zeros[[0, -1]])
+            yield _number(18, quantity, interpretation, (middle, middle), tolerance, zeros[[0, -1]])
 
 
 def _equal_view() -> Iterator[Number]:
     theta_i, theta_r = np.deg2rad([0.0, 20.0, 40.0, 60.0]), np.deg2rad(60.0)
-    rows: list[tuple[Reading, int, tuple[float, ...], float]] = [
-        (READINGS[0], 3, (7.82,) * 4, 0.0051),
-        (READINGS[0], 4, (5.34,) * 4, 0.0051),
-        (READINGS[2], 3, (8.52, 8.63, 8.70, 8.72), 0.011),
-        (READINGS[2], 4, (7.4, 8.7, 9.5, 9.8), 0.051),
+    rows: list[tuple[Interpretation, int, tuple[float, ...], float]] = [
+        (INTERPRETATIONS[0], 3, (7.82,) * 4, 0.0051),
+        (INTERPRETATIONS[0], 4, (5.34,) * 4, 0.0051),
+        (INTERPRETATIONS[2], 3, (8.52, 8.63, 8.70, 8.72), 0.011),
+        (INTERPRETATIONS[2], 4, (7.4, 8.7, 9.5, 9.8), 0.051),
     ]
-    for reading, number, expected, tolerance in rows:
+    for interpretation, number, expected, tolerance in rows:
         # the average over facets of the letter of eq. (13) needs the higher accuracy for four digits
-        model = reading.sample(number).replace(sigma=_FLAT, accuracy="high")
+        model = interpretation.sample(number).replace(sigma=_FLAT, accuracy="high")
         found = 100.0 * dolp(in_plane(model, theta_i, theta_r, "diffuse"))
         quantity = f"diffuse DoP (%) of sample {number} at θr = 60°, θi = 0, 20, 40, 60°, flat coating"
-        yield _number(19, quantity, reading, expected, tolerance, found)
+        yield _number(19, quantity, interpretation, expected, tolerance, found)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pbrdf.models import Model
-from pbrdf.reproduction.interpretations import Reading
+from pbrdf.reproduction.interpretations import Interpretation
 from pbrdf.reproduction.plane import in_plane, offsets, turned
 from pbrdf.reproduction.statements.statement import Outcome, listed
 
@@ -33,7 +33,7 @@ def radiance(model: Model, positions: Sequence[float], offset: np.ndarray) -> np
     return in_plane(model, theta_i, theta_r)[..., 0] * np.cos(theta_i)
 
 
-def narrow_peaks(reading: Reading, positions: Sequence[float]) -> Outcome:
+def narrow_peaks(interpretation: Interpretation, positions: Sequence[float]) -> Outcome:
     """Statement 6: a strong peak in the mirror direction that falls off fast, so the roughness is small.
 
     Half the width at half the peak, in degrees of turn of the sample, must be less than 5° for every sample and
@@ -43,7 +43,7 @@ def narrow_peaks(reading: Reading, positions: Sequence[float]) -> Outcome:
     """
     turn = offsets(14.0)
     widths = []
-    for model in reading.samples():
+    for model in interpretation.samples():
         values = radiance(model, positions, turn)
         widths.append(max(0.5 * np.ptp(np.rad2deg(turn[v >= 0.5 * v.max()])) for v in values))
     return Outcome(
@@ -51,7 +51,7 @@ def narrow_peaks(reading: Reading, positions: Sequence[float]) -> Outcome:
     )
 
 
-def local_incidence_grows(reading: Reading, positions: Sequence[float]) -> Outcome:
+def local_incidence_grows(interpretation: Interpretation, positions: Sequence[float]) -> Outcome:
     """Statement 9: the local incidence at the intensity's maximum grows from position 1 to 3.
 
     The facet that mirrors source into camera has β = Ψ/2 whatever the sample's angle. That the peak belongs to it: the
@@ -61,14 +61,14 @@ def local_incidence_grows(reading: Reading, positions: Sequence[float]) -> Outco
     """
     turn = offsets(14.0)
     beta = np.rad2deg(positions) / 2.0
-    maxima = [turn[radiance(model, positions, turn).argmax(axis=1)] for model in reading.samples()]
+    maxima = [turn[radiance(model, positions, turn).argmax(axis=1)] for model in interpretation.samples()]
     away = float(np.abs(np.rad2deg(maxima)).max())
     passed = bool((np.diff(beta) > 0.0).all()) and away < 1.0
     text = f"β = {listed(beta.tolist(), 'g', '°')}; maximum within {away:.2f}° of the mirror direction"
     return Outcome((*map(float, beta), away), passed, text)
 
 
-def peaks_alike(reading: Reading, positions: Sequence[float]) -> Outcome:
+def peaks_alike(interpretation: Interpretation, positions: Sequence[float]) -> Outcome:
     """Statement 10: the maxima of the intensity are roughly equal at the three positions.
 
     Cosine loss against Fresnel gain. Largest over smallest maximum of f cosθ_i must not exceed 1.25 for any
@@ -78,7 +78,7 @@ def peaks_alike(reading: Reading, positions: Sequence[float]) -> Outcome:
     """
     turn = offsets(2.0)
     ratios = []
-    for model in reading.samples():
+    for model in interpretation.samples():
         peaks = radiance(model, positions, turn).max(axis=1)
         ratios.append(peaks.max() / peaks.min())
     return Outcome(
@@ -86,7 +86,7 @@ def peaks_alike(reading: Reading, positions: Sequence[float]) -> Outcome:
     )
 
 
-def diffuse_intensity_falls(reading: Reading, positions: Sequence[float]) -> Outcome:
+def diffuse_intensity_falls(interpretation: Interpretation, positions: Sequence[float]) -> Outcome:
     """Statement 11: right of the peak, at the same sample angle, the diffuse intensity falls from position 1 to 3.
 
     The same sample angle is the same θ_i; θ_r grows with the position. Diffuse intensity at θ_r = 60° over that at
@@ -96,7 +96,7 @@ def diffuse_intensity_falls(reading: Reading, positions: Sequence[float]) -> Out
     """
     theta_i, near, far = np.deg2rad(DIFFUSE_AT)
     ratios = []
-    for model in reading.samples():
+    for model in interpretation.samples():
         first, last = in_plane(model, theta_i, [near, far], "diffuse")[:, 0]
         ratios.append(float(last / first))
     return Outcome(tuple(ratios), max(ratios) < 1.0, f"ratio {listed(ratios)}")

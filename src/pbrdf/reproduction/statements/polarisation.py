@@ -8,7 +8,7 @@ import numpy as np
 
 from pbrdf.models import Model
 from pbrdf.optics.stokes import dolp
-from pbrdf.reproduction.interpretations import Reading
+from pbrdf.reproduction.interpretations import Interpretation
 from pbrdf.reproduction.paper import FIGURE_3_INCIDENCE
 from pbrdf.reproduction.plane import in_plane, offsets, turned, zero_crossings
 from pbrdf.reproduction.statements.statement import Outcome, listed
@@ -46,7 +46,7 @@ def ten_per_cent_angles(models: Sequence[Model]) -> np.ndarray:
     return np.array(found)
 
 
-def diffuse_dop(reading: Reading, positions: Sequence[float]) -> Outcome:
+def diffuse_dop(interpretation: Interpretation, positions: Sequence[float]) -> Outcome:
     """Statement 1: some paints have diffuse light that is polarised by about 10 %.
 
     The degree of polarisation of the diffuse part must reach 10 % at an angle of view between 50° and 75° for at
@@ -54,7 +54,7 @@ def diffuse_dop(reading: Reading, positions: Sequence[float]) -> Outcome:
 
     Value: that angle (degrees) of each sample, NaN where 10 % is never reached.
     """
-    angles = ten_per_cent_angles(reading.samples())
+    angles = ten_per_cent_angles(interpretation.samples())
     passed = bool(((angles >= _WITHIN[0]) & (angles <= _WITHIN[1])).any())
     shown = ", ".join("never" if np.isnan(a) else f"{a:.0f}°" for a in angles)
     return Outcome(tuple(map(float, angles)), passed, f"10 % at θr = {shown}")
@@ -66,7 +66,7 @@ def figure_3_cut(model: Model, theta_r: np.ndarray) -> tuple[np.ndarray, np.ndar
     return stokes[..., 0], stokes[..., 1] / stokes[..., 0]
 
 
-def falls_to_zero_and_rises(reading: Reading, positions: Sequence[float]) -> Outcome:
+def falls_to_zero_and_rises(interpretation: Interpretation, positions: Sequence[float]) -> Outcome:
     """Statement 4: figure 3, away from the mirror direction the degree of polarisation falls to 0 and then rises.
 
     In the plane of incidence, on both sides of the largest degree about the mirror direction: Q/I must pass through 0
@@ -76,7 +76,7 @@ def falls_to_zero_and_rises(reading: Reading, positions: Sequence[float]) -> Out
     Value: zeros behind and ahead (degrees), the largest degree near the mirror direction and its angle.
     """
     theta_r = np.deg2rad(np.arange(-85.0, 85.001, 0.05))
-    _, q = figure_3_cut(reading.figure_3(), theta_r)
+    _, q = figure_3_cut(interpretation.figure_3(), theta_r)
     near = np.abs(theta_r - np.deg2rad(FIGURE_3_INCIDENCE)) < np.deg2rad(20.0)
     peak = int(np.argmax(np.where(near, -q, -np.inf)))
     zeros, good = [], True
@@ -98,7 +98,7 @@ def falls_to_zero_and_rises(reading: Reading, positions: Sequence[float]) -> Out
     return Outcome((behind, ahead, float(-q[peak]), where), bool(good and q[peak] < 0.0), text)
 
 
-def falls_off_the_peak(reading: Reading, positions: Sequence[float]) -> Outcome:
+def falls_off_the_peak(interpretation: Interpretation, positions: Sequence[float]) -> Outcome:
     """Statement 15: a specular peak and a diffuse slope; off the peak the degree of polarisation falls quickly.
 
     15° of turn to either side of the mirror direction at most half of the peak's degree is left, for every sample and
@@ -108,7 +108,7 @@ def falls_off_the_peak(reading: Reading, positions: Sequence[float]) -> Outcome:
     """
     turn = np.concatenate([offsets(3.0), np.deg2rad([-_OFF, _OFF])])
     shares = []
-    for model in reading.samples():
+    for model in interpretation.samples():
         degrees = dolp(in_plane(model, *turned(positions, turn)))
         shares.append(float((degrees[:, -2:].max(axis=1) / degrees[:, :-2].max(axis=1)).max()))
     return Outcome(
@@ -118,7 +118,7 @@ def falls_off_the_peak(reading: Reading, positions: Sequence[float]) -> Outcome:
     )
 
 
-def maximum_grows(reading: Reading, positions: Sequence[float]) -> Outcome:
+def maximum_grows(interpretation: Interpretation, positions: Sequence[float]) -> Outcome:
     """Statement 16: the largest degree of polarisation grows from position 1 to 3, as β stays below Brewster's angle.
 
     For every sample the maxima must grow with the position, and Ψ/2 of the last position must be less than arctan n.
@@ -127,16 +127,16 @@ def maximum_grows(reading: Reading, positions: Sequence[float]) -> Outcome:
     """
     turn = offsets(9.0)
     maxima = np.array(
-        [dolp(in_plane(model, *turned(positions, turn))).max(axis=1) for model in reading.samples()]
+        [dolp(in_plane(model, *turned(positions, turn))).max(axis=1) for model in interpretation.samples()]
     )
-    brewster = min(float(np.rad2deg(np.arctan(model.values["n"]))) for model in reading.samples())
+    brewster = min(float(np.rad2deg(np.arctan(model.values["n"]))) for model in interpretation.samples())
     beta = float(np.rad2deg(positions[-1])) / 2.0
     passed = bool((np.diff(maxima, axis=1) > 0.0).all()) and beta < brewster
     text = f"sample 3: {listed(maxima[2], '.3f')}; Ψ/2 ≤ {beta:g}° < {brewster:.1f}°"
     return Outcome((*map(float, maxima[2]), beta, brewster), passed, text)
 
 
-def crossed_and_growing(reading: Reading, positions: Sequence[float]) -> Outcome:
+def crossed_and_growing(interpretation: Interpretation, positions: Sequence[float]) -> Outcome:
     """Statement 17: at large angles of view the degree of polarisation is not 0 and grows, and its plane is crossed.
 
     From 17° off the mirror direction to θ_r = 78°, every sample and position: the degree must exceed 1 % and grow
@@ -147,7 +147,7 @@ def crossed_and_growing(reading: Reading, positions: Sequence[float]) -> Outcome
     for crossed or not.
     """
     least, growing, crossed = [], 0, True
-    for model in reading.samples():
+    for model in interpretation.samples():
         degrees, grows = [], True
         for psi in positions:
             theta_r = np.deg2rad(np.arange(np.rad2deg(psi) / 2.0 + _CLEAR, _FARTHEST + 1e-9, 1.0))
@@ -166,7 +166,7 @@ def crossed_and_growing(reading: Reading, positions: Sequence[float]) -> Outcome
     return Outcome((*least, float(growing), float(crossed)), bool(passed), text)
 
 
-def zeros_beside_the_peak(reading: Reading, positions: Sequence[float]) -> Outcome:
+def zeros_beside_the_peak(interpretation: Interpretation, positions: Sequence[float]) -> Outcome:
     """Statement 18: the degree of polarisation passes through 0 on both sides of the peak.
 
     Q/I must change sign within 16° of turn on both sides of the mirror direction, for every sample and position.
@@ -175,7 +175,7 @@ def zeros_beside_the_peak(reading: Reading, positions: Sequence[float]) -> Outco
     """
     turn = offsets(16.0)
     shown, passed = [], True
-    for number, model in enumerate(reading.samples(), start=1):
+    for number, model in enumerate(interpretation.samples(), start=1):
         stokes = in_plane(model, *turned(positions, turn))
         for position, q in enumerate(stokes[..., 1] / stokes[..., 0]):
             zeros = np.rad2deg(zero_crossings(turn, q))
@@ -189,7 +189,7 @@ def zeros_beside_the_peak(reading: Reading, positions: Sequence[float]) -> Outco
     return Outcome(tuple(shown), passed, text)
 
 
-def equal_view_equal_dop(reading: Reading, positions: Sequence[float]) -> Outcome:
+def equal_view_equal_dop(interpretation: Interpretation, positions: Sequence[float]) -> Outcome:
     """Statement 19: right of the peak equal θ_r mean equal diffuse degree of polarisation, whatever the position.
 
     The degree of the diffuse part at θ_r = 40°, 60°, 70° must not vary by more than 0.01 (the imager's linear
@@ -200,6 +200,6 @@ def equal_view_equal_dop(reading: Reading, positions: Sequence[float]) -> Outcom
     theta_i, theta_r = np.deg2rad([[0.0], [20.0], [40.0], [60.0]]), np.deg2rad([40.0, 60.0, 70.0])
     spread = [
         float(np.ptp(dolp(in_plane(model, theta_i, theta_r, "diffuse")), axis=0).max())
-        for model in reading.samples()
+        for model in interpretation.samples()
     ]
     return Outcome(tuple(spread), max(spread) <= _SAME, f"varies by {listed(spread, '.4f')}")

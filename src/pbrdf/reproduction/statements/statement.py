@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from pbrdf.reproduction.interpretations import Reading
+from pbrdf.reproduction.interpretations import Interpretation
 
 __all__ = ["Kind", "Outcome", "Statement", "listed", "signed"]
 
@@ -34,7 +34,7 @@ class Outcome(NamedTuple):
 class Kind(enum.StrEnum):
     """What a statement is about."""
 
-    MODEL = "model"  # follows from the model, or does not: tested for every reading
+    MODEL = "model"  # follows from the model, or does not: tested for every interpretation
     TABLE = "parameters"  # about table 1: tested on the printed and on the recovered parameters
     SHOWN = "shown"  # a figure or a protocol: nothing to test
     MEASURED = "measured data"  # about the paper's measured data only: not tested
@@ -55,15 +55,15 @@ class Statement:
     kind
         What it is about.
     test
-        From a reading and the bistatic angles of the camera positions (radians, ascending) to the outcome; None
-        where the reading does not matter or there is no test.
+        From an interpretation and the bistatic angles of the camera positions (radians, ascending) to the outcome; None
+        where the interpretation does not matter or there is no test.
     """
 
     number: int
     said: str
     tested: str
     kind: Kind
-    test: Callable[[Reading, Sequence[float]], Outcome] | None = None
+    test: Callable[[Interpretation, Sequence[float]], Outcome] | None = None
 
 
 def listed(values: Sequence[float], form: str = ".2f", unit: str = "") -> str:

@@ -11,7 +11,7 @@ from pbrdf.instruments.goniometer.protocols import Protocol
 from pbrdf.inversion.erroranalysis import error_analysis
 from pbrdf.inversion.fit import fit
 from pbrdf.models.extended_source import stokes_under_disc
-from pbrdf.reproduction.interpretations import Reading
+from pbrdf.reproduction.interpretations import Interpretation
 from pbrdf.reproduction.statements.statement import Outcome, listed
 
 __all__ = ["RADIUS", "errors_at_peaks", "wide_source_explains_the_peaks"]
@@ -22,7 +22,9 @@ RADIUS = np.deg2rad(5.0)
 _ACCURACY = 0.01
 
 
-def errors_at_peaks(reading: Reading, positions: Sequence[float], radius: float = RADIUS) -> np.ndarray:
+def errors_at_peaks(
+    interpretation: Interpretation, positions: Sequence[float], radius: float = RADIUS
+) -> np.ndarray:
     """Relative errors (model − data) of the intensity at the strongest specular point, shape (samples, positions).
 
     Noiseless data of the five samples under a round source of `radius` (radians); the model, under a point source,
@@ -31,7 +33,7 @@ def errors_at_peaks(reading: Reading, positions: Sequence[float], radius: float 
     protocol = Protocol.in_plane(positions)
     angles = (protocol.theta_i, protocol.theta_r, protocol.phi)
     found = []
-    for model in reading.samples():
+    for model in interpretation.samples():
         stokes = stokes_under_disc(model, *angles, radius)
         data = make_dataset(
             *angles,
@@ -48,7 +50,7 @@ def errors_at_peaks(reading: Reading, positions: Sequence[float], radius: float 
     return np.array([[np.nan if p is None else p.relative_error for p in points] for points in found])
 
 
-def wide_source_explains_the_peaks(reading: Reading, positions: Sequence[float]) -> Outcome:
+def wide_source_explains_the_peaks(interpretation: Interpretation, positions: Sequence[float]) -> Outcome:
     """Statement 13: but for sample 1 the modelled peaks are too low at position 1, too high at 2, and more so at 3.
 
     The paper suspects cosine correction or shadowing. Here: noiseless data under a source of 5° radius, fitted by the
@@ -59,7 +61,7 @@ def wide_source_explains_the_peaks(reading: Reading, positions: Sequence[float])
 
     Value: errors at the three positions of sample 3, then of sample 1.
     """
-    errors = errors_at_peaks(reading, positions)
+    errors = errors_at_peaks(interpretation, positions)
     others = errors[1:]
     passed = (others[:, 0] < 0.0) & (others[:, 1] > 0.0) & (others[:, 2] > others[:, 1])
     text = f"sample 3: {listed(100 * errors[2], '+.0f', ' %')} (sample 1: {listed(100 * errors[0], '+.0f', ' %')})"

@@ -1,0 +1,33 @@
+"""``pbrdf check``: is a file of data understood, and what is in it."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pbrdf.cli.options import data_argument, with_reading_options
+from pbrdf.cli.reading import Reading
+
+__all__ = ["check"]
+
+
+@with_reading_options
+def check(
+    file: Annotated[str, data_argument("FILE")],
+    *,
+    reading: Reading,
+) -> None:
+    """Tell what a file of data holds, and what is wrong or suspicious in it.
+
+    The exit code is 2 if the file cannot be used as it stands.
+    """
+    from pbrdf.data import check as issues_of
+    from pbrdf.report.dataset.describe import describe
+
+    dataset = reading.open(file)
+    for line in describe(dataset):
+        print(line)
+    issues = issues_of(dataset)
+    for issue in issues:
+        print(f"{issue.severity}: {issue}")
+    if not issues:
+        print("Nothing is wrong with it.")
