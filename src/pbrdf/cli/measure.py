@@ -133,7 +133,7 @@ def measure(
 
     Of a plan: `pbrdf measure white --angles plan.csv -o planned && pbrdf fit planned/white.nc`
     """
-    import pbrdf
+    from pbrdf.backend import set_backend
     from pbrdf.data.paints import PAINTS, WAVELENGTH
     from pbrdf.instruments.goniometer.source import AngleErrors, Source
     from pbrdf.instruments.virtual.experiment import VirtualExperiment
@@ -143,7 +143,7 @@ def measure(
         raise PbrdfError(f"--wavelength {wavelength:g}: give a wavelength above 0 in nm")
     require_new(output)
     if backend is not None:
-        pbrdf.set_backend(backend)
+        set_backend(backend)
     taken = open_instrument(instrument)
     if bits is not None:
         taken = replace(taken, detector=_with_bits(taken.detector, bits))

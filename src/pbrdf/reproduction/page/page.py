@@ -8,7 +8,6 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import pbrdf
 from pbrdf.report.numbers import brief
 from pbrdf.reproduction import paper
 from pbrdf.reproduction.experiment.sample import Sample
@@ -25,6 +24,7 @@ from pbrdf.reproduction.page.tables import recovered
 from pbrdf.reproduction.statements.catalogue import Evaluated
 from pbrdf.reproduction.statements.parameters import agreement
 from pbrdf.reproduction.statements.statement import Kind
+from pbrdf.version import __version__
 
 if TYPE_CHECKING:
     from pbrdf.reproduction.run import Reproduction
@@ -78,7 +78,7 @@ def _parts(reproduction: Reproduction, folder: Path) -> Iterator[str]:
         "table 1 are measured in a simulation (frames of the imager, reduced to Stokes vectors), inverted the "
         "paper's way, and each of its statements that follows from the model is tested."
     )
-    yield paragraph(f"Settings: {options.in_words()}. pbrdf {pbrdf.__version__}.")
+    yield paragraph(f"Settings: {options.in_words()}. pbrdf {__version__}.")
     yield (
         "<ul>"
         + "".join(f"<li>{escape(line)}</li>" for line in verdicts_in_words(reproduction.statements))
