@@ -95,5 +95,7 @@ def test_a_name_brings_its_module_and_not_before():
 
 def test_version_of_package_and_metadata():
     assert importlib.metadata.version("pbrdf") == pbrdf.__version__
-    found = [path for path in PACKAGE.rglob("*.py") if f'"{pbrdf.__version__}"' in path.read_text(encoding="utf-8")]
+    found = [
+        path for path in PACKAGE.rglob("*.py") if f'"{pbrdf.__version__}"' in path.read_text(encoding="utf-8")
+    ]
     assert [path.name for path in found] == ["version.py"]

@@ -45,7 +45,9 @@ def test_circles_are_found():
 
 def test_no_circle_of_files(graph):
     """A package's ``__init__`` and its own modules too, which the contract on siblings leaves out."""
-    assert circles({module: graph.find_modules_directly_imported_by(module) for module in graph.modules}) == []
+    assert (
+        circles({module: graph.find_modules_directly_imported_by(module) for module in graph.modules}) == []
+    )
 
 
 def test_nothing_inside_imports_the_front_door(graph):
