@@ -43,7 +43,6 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
-import pbrdf  # noqa: F401  (points Dr.Jit to its LLVM, so it comes before anything that imports Dr.Jit)
 from pbrdf.backend import get_backend, llvm_version, thread_count
 from pbrdf.models.double_gauss import DoubleGauss
 from pbrdf.optics import quadrature

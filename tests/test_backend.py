@@ -25,6 +25,7 @@ def restored(monkeypatch):
 
 
 def python(code, **environment):
+    """Run the code in a process of its own, which has not been told of any LLVM."""
     env = {k: v for k, v in os.environ.items() if k not in ("DRJIT_LIBLLVM_PATH", "PBRDF_BACKEND")}
     env["PYTHONPATH"] = SOURCE
     env.update(environment)
@@ -134,6 +135,149 @@ def test_no_llvm_at_all(monkeypatch):
 
 
 def test_importing_pbrdf_does_not_import_drjit():
-    """The command line starts fast, and drjit is imported after its LLVM is chosen."""
+    """The command line starts fast."""
     run = python("import sys, pbrdf; print('drjit' in sys.modules)")
     assert run.stdout.strip() == "False", run.stderr
+
+
+PAINT = "; print(pbrdf.backend.llvm_version()[0], pbrdf.load_paint('white').mueller(0.5, 0.6, 3.0)[0, 0])"
+FINDS_NOTHING = (
+    "import os; os.environ['DRJIT_LIBLLVM_PATH'] = '/nonexistent'; import drjit; "
+    "del os.environ['DRJIT_LIBLLVM_PATH']; assert not drjit.has_backend(drjit.JitBackend.LLVM)"
+)
+BUNDLED = backend.find_bundled_llvm()
+
+
+@pytest.mark.skipif(BUNDLED is None, reason="the packaged LLVM is for Linux x86-64")
+class TestDrJitImportedBefore:
+    """``import drjit`` or ``import mitsuba`` stands above ``import pbrdf``, as in sorted imports."""
+
+    def check(self, before, after="import pbrdf, pbrdf.backend"):
+        pbrdf.set_backend("llvm")
+        expected = pbrdf.load_paint("white").mueller(0.5, 0.6, 3.0)[0, 0]
+        run = python(f"{before}; {after}{PAINT}", PBRDF_BACKEND="llvm")
+        assert run.returncode == 0, run.stderr
+        version, value = run.stdout.split()[-2:]
+        assert int(version) >= backend.MINIMUM_LLVM
+        assert float(value) == pytest.approx(expected, rel=1e-12)
+        return run
+
+    def test_with_what_this_machine_has(self):
+        self.check("import drjit")
+
+    def test_where_it_finds_nothing(self):
+        self.check(FINDS_NOTHING)
+
+    def test_mitsuba(self):
+        pytest.importorskip("mitsuba")
+        self.check("import mitsuba as mi")
+        run = self.check(
+            f"{FINDS_NOTHING}; import mitsuba as mi",
+            "import pbrdf, pbrdf.backend; mi.set_variant('llvm_ad_mono_polarized'); import pbrdf.rendering; "
+            "pbrdf.rendering.register(); print(mi.load_dict({'type': 'pbrdf', 'paint': 'white'}))",
+        )
+        assert "PaintedSurface[" in run.stdout
+
+    def test_a_variant_is_active(self):
+        pytest.importorskip("mitsuba")
+        before = "import mitsuba as mi; mi.set_variant('llvm_ad_mono_polarized')"
+        if python(before).returncode:
+            pytest.skip("this machine has no LLVM of its own: Mitsuba itself refuses")
+        run = self.check(
+            before,
+            "import numpy as np, pbrdf, pbrdf.backend, pbrdf.rendering; pbrdf.rendering.register(); "
+            "s = mi.load_dict({'type': 'scene', 'integrator': {'type': 'path'}, 'light': {'type': 'constant'}, "
+            "'ball': {'type': 'sphere', 'bsdf': {'type': 'pbrdf', 'paint': 'white'}}, "
+            "'sensor': {'type': 'perspective', 'film': {'type': 'hdrfilm', 'width': 4, 'height': 4}}}); "
+            "print(bool(np.isfinite(mi.render(s, spp=4)).all()))",
+        )
+        assert "True" in run.stdout
+
+    def test_the_users_path_is_left_alone(self):
+        code = (
+            "import drjit, os, pbrdf\n"
+            "try: pbrdf.get_backend()\n"
+            "except pbrdf.BackendError as error: print(error)\n"
+            "print(os.environ['DRJIT_LIBLLVM_PATH'])"
+        )
+        run = python(code, DRJIT_LIBLLVM_PATH="/nonexistent/mine.so", PBRDF_BACKEND="llvm")
+        error, path = run.stdout.splitlines()
+        assert "no usable LLVM on this machine. Install an LLVM" in error
+        assert path == "/nonexistent/mine.so"
+
+    def test_arrays_made_before_keep_working(self):
+        """A restart of Dr.Jit: data, literals, expressions not yet evaluated, and derivatives."""
+        code = (
+            "import drjit as dr\n"
+            "from pbrdf.drjit_core import look_for_llvm_again as again\n"
+            "F = dr.llvm.ad.Float64\n"
+            "x = F([1, 2, 3]); dr.enable_grad(x); y = x * F(2) + 1; i = dr.arange(dr.llvm.UInt32, 4)\n"
+            "print(again(10 ** 6), again(1))\n"
+            "z = y * x; dr.backward(z)\n"
+            "print(x, y, z, i, dr.grad(x))\n"
+        )
+        run = python(code, DRJIT_LIBLLVM_PATH=str(BUNDLED))
+        assert run.stdout.splitlines() == [
+            "False True",
+            "[1, 2, 3] [3, 5, 7] [3, 10, 21] [0, 1, 2, 3] [5, 9, 13]",
+        ]
+        assert (run.returncode, run.stderr) == (0, "")
+
+    @pytest.mark.parametrize(
+        "work",
+        [
+            "import drjit as dr; x = dr.llvm.Float([1, 2]) + 1; dr.eval(x)",
+            "import mitsuba as mi; mi.set_variant('llvm_ad_rgb'); x = mi.load_dict({'type': 'diffuse'})",
+        ],
+        ids=["kernel", "scene object"],
+    )
+    def test_what_a_restart_would_destroy_is_kept(self, work):
+        """The old LLVM stays, ``pbrdf`` refuses it and says what to do; what it made keeps working."""
+        if "mitsuba" in work:
+            pytest.importorskip("mitsuba")
+        code = (
+            f"{work}\n"
+            "import os\n"
+            "from unittest import mock\n"
+            "del os.environ['DRJIT_LIBLLVM_PATH']\n"
+            "with mock.patch('drjit.detail.llvm_version', lambda: (15, 0, 7)):\n"
+            "    import pbrdf\n"
+            "    try: pbrdf.get_backend()\n"
+            "    except pbrdf.BackendError as error: print(error)\n"
+            "print(x)\n"
+        )
+        run = python(code, DRJIT_LIBLLVM_PATH=str(BUNDLED), PBRDF_BACKEND="llvm")
+        assert (run.returncode, run.stderr) == (0, "")
+        error, value = run.stdout.split("\n", maxsplit=1)
+        assert error == (
+            "the LLVM that Dr.Jit loaded is version 15.0.7, too old. Dr.Jit was at work before pbrdf was imported "
+            "and cannot change its LLVM any more: start Python again and import pbrdf first"
+        )
+        assert value.startswith(("[2, 3]", "SmoothDiffuse["))
+
+    @pytest.mark.parametrize("library", ["libm.so.6", "nothing.so"])
+    def test_a_core_library_of_another_kind(self, library):
+        """Without the functions or the library known here Dr.Jit stays as it is, and the way out is named."""
+        code = (
+            f"{FINDS_NOTHING}\n"
+            "from unittest import mock; import ctypes\n"
+            "real = ctypes.CDLL\n"
+            f"with mock.patch('ctypes.CDLL', lambda path: real({library!r})): import pbrdf\n"
+            "try: pbrdf.get_backend()\n"
+            "except pbrdf.BackendError as error: print(error)\n"
+        )
+        run = python(code, PBRDF_BACKEND="llvm")
+        assert "no usable LLVM on this machine. Dr.Jit was at work before pbrdf was imported" in run.stdout
+
+    def test_a_core_library_without_symbols(self):
+        """Nothing is written where the symbol table does not tell the place."""
+        code = (
+            "import drjit, os, pbrdf.drjit_core as core\n"
+            f"os.environ['DRJIT_LIBLLVM_PATH'] = {str(BUNDLED)!r}\n"
+            "symbols, core._symbols = core._symbols, lambda elf: {}\n"
+            "print(core.look_for_llvm_again(17))\n"
+            "core._symbols = symbols\n"
+            "print(core.look_for_llvm_again(17))\n"
+        )
+        run = python(code, DRJIT_LIBLLVM_PATH="/nonexistent")
+        assert run.stdout.split() == ["False", "True"], run.stderr

@@ -18,9 +18,7 @@ from typing import Any
 import numpy as np
 
 import pbrdf
-from pbrdf.rendering import bsdf_dict
 from pbrdf.rendering.scenes import Camera
-from pbrdf.rendering.variant import start_mitsuba
 
 #: With accuracy "fast" the average over the facets has no loop, through which Dr.Jit could not go backwards.
 TRUTH = pbrdf.DoubleGauss(sigma=0.05, n=1.65, a=0.3, k=1.2, b=0.2, t=0.6, accuracy="fast")
@@ -46,7 +44,7 @@ def ball(mi: Any, paint: pbrdf.Model, lamp: tuple[float, float, float], size: in
         {
             "type": "scene",
             "sensor": CAMERA.to_dict(size, size),
-            "ball": {"type": "sphere", "radius": 0.5, "bsdf": bsdf_dict(paint)},
+            "ball": {"type": "sphere", "radius": 0.5, "bsdf": pbrdf.bsdf_dict(paint)},
             "lamp": {
                 "type": "point",
                 "position": list(lamp),
@@ -65,7 +63,7 @@ def recover(size: int = 64, iterations: int = 120, spp: int = 16) -> History:
     """Search for the paint of the pictures."""
     import drjit as dr
 
-    mi = start_mitsuba()
+    mi = pbrdf.start_mitsuba()
     # nothing but the ball is there to reflect: `direct` follows all paths, and needs no loop to be differentiated
     integrator = mi.load_dict({"type": "stokes", "nested": {"type": "direct"}})
     pictures = []

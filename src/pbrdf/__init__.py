@@ -7,6 +7,8 @@ Everything a user needs stands here by name and is loaded when first used::
     paint = pbrdf.DoubleGauss(sigma=0.04, n=1.62, a=1.5, k=1.25, b=0.2, t=0.67)
     paint.mueller(theta_i, theta_r, phi)          # 4 x 4 Mueller matrices, 1/sr
     result = pbrdf.fit(pbrdf.read("paint.csv"))   # parameters with their uncertainty
+
+``dir(pbrdf)`` lists the names, ``help(pbrdf.fit)`` explains one.
 """
 
 from __future__ import annotations
@@ -16,10 +18,30 @@ from typing import TYPE_CHECKING, Any
 
 from pbrdf.backend import get_backend, point_drjit_to_llvm, set_backend
 from pbrdf.errors import BackendError, DataError, FitError, ModelError, PbrdfError
+from pbrdf.version import __version__
 
 if TYPE_CHECKING:
     from pbrdf.data import check, make_dataset, read, validate, write
     from pbrdf.data.paints import PAINTS, load_paint, open_experiment
+    from pbrdf.instruments.calibration.instrument_calibration import calibrate_instrument
+    from pbrdf.instruments.goniometer.protocols import Protocol
+    from pbrdf.instruments.polarimeter.detector import Detector
+    from pbrdf.instruments.polarimeter.instrument import Instrument
+    from pbrdf.instruments.polarimeter.instrument_files import load_instrument, save_instrument
+    from pbrdf.instruments.polarimeter.merit import merit
+    from pbrdf.instruments.polarimeter.polarimeter import (
+        Polarimeter,
+        division_of_focal_plane,
+        lcvr,
+        rotating_polarizer,
+        rotating_retarder,
+    )
+    from pbrdf.instruments.polarimeter.polarization_errors import polarization
+    from pbrdf.instruments.polarimeter.presets import preset
+    from pbrdf.instruments.polarimeter.retardance_sets import retardance_set
+    from pbrdf.instruments.reduction.series import goniometric_datasets
+    from pbrdf.instruments.reduction.stokes_image import reduce_frames
+    from pbrdf.instruments.virtual.experiment import VirtualExperiment
     from pbrdf.inversion import (
         FitResult,
         HoldOut,
@@ -30,80 +52,165 @@ if TYPE_CHECKING:
         fit,
         plausibility,
     )
+    from pbrdf.inversion.bootstrap import bootstrap
+    from pbrdf.inversion.identifiability import identifiability
+    from pbrdf.inversion.profile import contour, profile
     from pbrdf.models import DoubleGauss, Model, ReciprocalDoubleGauss, load_model
     from pbrdf.models.reflectance import directional_hemispherical_reflectance
     from pbrdf.optics.mueller import coherency_eigenvalues
     from pbrdf.optics.stokes import aolp, docp, dolp, dop
+    from pbrdf.planning.plan import plan
+    from pbrdf.rendering.bsdf import register as register_bsdf
+    from pbrdf.rendering.export import write_merl, write_pbsdf
+    from pbrdf.rendering.properties import bsdf_dict
+    from pbrdf.rendering.render import render_stokes
+    from pbrdf.rendering.variant import start_mitsuba
 
-__version__ = "0.1.0"
-
+# name: where it is, as module, or module:name where it has another name there
 _HOME = {
-    "pbrdf.data": ("check", "make_dataset", "read", "validate", "write"),
-    "pbrdf.data.paints": ("PAINTS", "load_paint", "open_experiment"),
-    "pbrdf.inversion": (
-        "FitResult",
-        "HoldOut",
-        "NoiseModel",
-        "Nuisance",
-        "cross_validate",
-        "error_analysis",
-        "fit",
-        "plausibility",
-    ),
-    "pbrdf.models": ("DoubleGauss", "Model", "ReciprocalDoubleGauss", "load_model"),
-    "pbrdf.models.reflectance": ("directional_hemispherical_reflectance",),
-    "pbrdf.optics.mueller": ("coherency_eigenvalues",),
-    "pbrdf.optics.stokes": ("aolp", "docp", "dolp", "dop"),
+    # models and the bundled paints
+    "DoubleGauss": "pbrdf.models",
+    "ReciprocalDoubleGauss": "pbrdf.models",
+    "Model": "pbrdf.models",
+    "load_model": "pbrdf.models",
+    "load_paint": "pbrdf.data.paints",
+    "PAINTS": "pbrdf.data.paints",
+    # Stokes parameters and Mueller matrices
+    "dop": "pbrdf.optics.stokes",
+    "dolp": "pbrdf.optics.stokes",
+    "docp": "pbrdf.optics.stokes",
+    "aolp": "pbrdf.optics.stokes",
+    "coherency_eigenvalues": "pbrdf.optics.mueller",
+    # data sets
+    "read": "pbrdf.data",
+    "write": "pbrdf.data",
+    "make_dataset": "pbrdf.data",
+    "check": "pbrdf.data",
+    "validate": "pbrdf.data",
+    "open_experiment": "pbrdf.data.paints",
+    # fit
+    "fit": "pbrdf.inversion",
+    "FitResult": "pbrdf.inversion",
+    "NoiseModel": "pbrdf.inversion",
+    "Nuisance": "pbrdf.inversion",
+    "HoldOut": "pbrdf.inversion",
+    # how far to trust a fit
+    "profile": "pbrdf.inversion.profile",
+    "contour": "pbrdf.inversion.profile",
+    "bootstrap": "pbrdf.inversion.bootstrap",
+    "identifiability": "pbrdf.inversion.identifiability",
+    "cross_validate": "pbrdf.inversion",
+    "error_analysis": "pbrdf.inversion",
+    "plausibility": "pbrdf.inversion",
+    "directional_hemispherical_reflectance": "pbrdf.models.reflectance",
+    # polarimeters and their calibration
+    "Instrument": "pbrdf.instruments.polarimeter.instrument",
+    "load_instrument": "pbrdf.instruments.polarimeter.instrument_files",
+    "save_instrument": "pbrdf.instruments.polarimeter.instrument_files",
+    "preset": "pbrdf.instruments.polarimeter.presets",
+    "Detector": "pbrdf.instruments.polarimeter.detector",
+    "Polarimeter": "pbrdf.instruments.polarimeter.polarimeter",
+    "lcvr": "pbrdf.instruments.polarimeter.polarimeter",
+    "retardance_set": "pbrdf.instruments.polarimeter.retardance_sets",
+    "rotating_retarder": "pbrdf.instruments.polarimeter.polarimeter",
+    "rotating_polarizer": "pbrdf.instruments.polarimeter.polarimeter",
+    "division_of_focal_plane": "pbrdf.instruments.polarimeter.polarimeter",
+    "merit": "pbrdf.instruments.polarimeter.merit",
+    "calibrate_instrument": "pbrdf.instruments.calibration.instrument_calibration",
+    # frames to Stokes parameters to data sets
+    "reduce_frames": "pbrdf.instruments.reduction.stokes_image",
+    "goniometric_datasets": "pbrdf.instruments.reduction.series",
+    "polarization": "pbrdf.instruments.polarimeter.polarization_errors",
+    # goniometer: what to measure, and the measurement simulated
+    "Protocol": "pbrdf.instruments.goniometer.protocols",
+    "plan": "pbrdf.planning.plan",
+    "VirtualExperiment": "pbrdf.instruments.virtual.experiment",
+    # scenes
+    "start_mitsuba": "pbrdf.rendering.variant",
+    "register_bsdf": "pbrdf.rendering.bsdf:register",
+    "bsdf_dict": "pbrdf.rendering.properties",
+    "render_stokes": "pbrdf.rendering.render",
+    "write_pbsdf": "pbrdf.rendering.export",
+    "write_merl": "pbrdf.rendering.export",
 }
-_MODULE_OF = {name: module for module, names in _HOME.items() for name in names}
 
 __all__ = [
     "PAINTS",
     "BackendError",
     "DataError",
+    "Detector",
     "DoubleGauss",
     "FitError",
     "FitResult",
     "HoldOut",
+    "Instrument",
     "Model",
     "ModelError",
     "NoiseModel",
     "Nuisance",
     "PbrdfError",
+    "Polarimeter",
+    "Protocol",
     "ReciprocalDoubleGauss",
+    "VirtualExperiment",
+    "__version__",
     "aolp",
+    "bootstrap",
+    "bsdf_dict",
+    "calibrate_instrument",
     "check",
     "coherency_eigenvalues",
+    "contour",
     "cross_validate",
     "directional_hemispherical_reflectance",
+    "division_of_focal_plane",
     "docp",
     "dolp",
     "dop",
     "error_analysis",
     "fit",
     "get_backend",
+    "goniometric_datasets",
+    "identifiability",
+    "lcvr",
+    "load_instrument",
     "load_model",
     "load_paint",
     "make_dataset",
+    "merit",
     "open_experiment",
+    "plan",
     "plausibility",
+    "polarization",
+    "preset",
+    "profile",
     "read",
+    "reduce_frames",
+    "register_bsdf",
+    "render_stokes",
+    "retardance_set",
+    "rotating_polarizer",
+    "rotating_retarder",
+    "save_instrument",
     "set_backend",
+    "start_mitsuba",
     "validate",
     "write",
+    "write_merl",
+    "write_pbsdf",
 ]
 
-# Dr.Jit looks for LLVM when it is imported, so this comes before anything that does
 point_drjit_to_llvm()
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _MODULE_OF:
+    if name not in _HOME:
         raise AttributeError(f"module 'pbrdf' has no attribute {name!r}")
-    value = getattr(importlib.import_module(_MODULE_OF[name]), name)
+    module, _, own_name = _HOME[name].partition(":")
+    value = getattr(importlib.import_module(module), own_name or name)
     globals()[name] = value
     return value
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    return __all__

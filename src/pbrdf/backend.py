@@ -7,6 +7,9 @@ shared library is looked for in this order:
 2. the library of the PyPI package ``karellen-llvm-core`` (Linux x86-64), twice as fast here as Debian's 19;
 3. whatever Dr.Jit finds on the system by itself.
 
+Dr.Jit looks when it is imported. If that was before ``pbrdf``, and what it found is missing or too old, it is made to
+look again (:mod:`pbrdf.drjit_core`), so the order of imports does not matter.
+
 LLVM 15 and 16 abort the process on ``dr.minimum`` and LLVM 14 is refused by Dr.Jit, so a system library
 older than 17 is refused here with a message instead. The environment variable ``PBRDF_BACKEND``
 (``auto``, ``llvm`` or ``cuda``) or :func:`set_backend` choose the backend; ``auto`` takes CUDA if a device
@@ -17,6 +20,7 @@ from __future__ import annotations
 
 import importlib.metadata
 import os
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
@@ -95,6 +99,7 @@ class Backend:
 
 _chosen: str | None = None
 _active: Backend | None = None
+_too_late = False
 
 
 def find_bundled_llvm() -> Path | None:
@@ -153,10 +158,16 @@ def get_backend() -> Backend:
 def point_drjit_to_llvm() -> None:
     """Set ``DRJIT_LIBLLVM_PATH`` to the packaged LLVM, unless the user has set it.
 
-    Dr.Jit looks for LLVM when it is imported, so this runs when ``pbrdf`` is.
+    Runs when ``pbrdf`` is imported. A Dr.Jit that was imported before looks for LLVM again.
     """
-    if LIBRARY_VARIABLE not in os.environ and (bundled := find_bundled_llvm()) is not None:
-        os.environ[LIBRARY_VARIABLE] = str(bundled)
+    global _too_late
+    if LIBRARY_VARIABLE in os.environ or (bundled := find_bundled_llvm()) is None:
+        return
+    os.environ[LIBRARY_VARIABLE] = str(bundled)
+    if "drjit" in sys.modules:
+        from pbrdf.drjit_core import look_for_llvm_again
+
+        _too_late = not look_for_llvm_again(MINIMUM_LLVM)
 
 
 def _start(name: str) -> Backend:
@@ -172,7 +183,7 @@ def _start(name: str) -> Backend:
             "choose the backend llvm, or install an NVIDIA driver"
         )
     if not dr.has_backend(dr.JitBackend.LLVM):
-        raise BackendError(f"Dr.Jit finds no usable LLVM on this machine. {_INSTALL_HINT}")
+        raise BackendError(f"Dr.Jit finds no usable LLVM on this machine. {_hint()}")
     check_llvm()
     import drjit.llvm.ad as llvm_module
 
@@ -190,12 +201,16 @@ def check_llvm() -> None:
     version = llvm_version()
     if version is not None and version[0] < MINIMUM_LLVM:
         found = ".".join(map(str, version))
-        late = (
-            "Dr.Jit was imported before pbrdf and took it: import pbrdf first. "
-            if find_bundled_llvm() is not None
-            else ""
+        raise BackendError(f"the LLVM that Dr.Jit loaded is version {found}, too old. {_hint()}")
+
+
+def _hint() -> str:
+    if _too_late:
+        return (
+            "Dr.Jit was at work before pbrdf was imported and cannot change its LLVM any more: "
+            "start Python again and import pbrdf first"
         )
-        raise BackendError(f"the LLVM that Dr.Jit loaded is version {found}, too old. {late}{_INSTALL_HINT}")
+    return _INSTALL_HINT
 
 
 def llvm_version() -> tuple[int, ...] | None:

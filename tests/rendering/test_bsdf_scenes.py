@@ -239,7 +239,7 @@ class TestErrors:
             pbrdf.rendering.register()
 
     def test_an_llvm_that_aborts(self, monkeypatch):
-        """Dr.Jit takes whatever LLVM the system has if it is imported before pbrdf."""
+        """An old LLVM of the user's choice, or one that Dr.Jit has worked with before pbrdf was imported."""
         use("llvm_ad_mono")
         monkeypatch.setattr(backend, "llvm_version", lambda: (15, 0, 6))
         with pytest.raises(BackendError, match=r"version 15\.0\.6, too old"):

@@ -25,17 +25,18 @@ def doctor(backend: Backend = None) -> None:
     import importlib.metadata
     import platform
 
-    import pbrdf
+    from pbrdf.backend import set_backend
+    from pbrdf.version import __version__
 
     rows = [
-        ("pbrdf", pbrdf.__version__),
+        ("pbrdf", __version__),
         ("Python", f"{platform.python_version()} on {platform.system()} {platform.machine()}"),
         ("Dr.Jit", importlib.metadata.version("drjit")),
     ]
     problem = None
     try:
         if backend is not None:
-            pbrdf.set_backend(backend)
+            set_backend(backend)
         rows += _backend_rows()
     except BackendError as error:
         problem = error

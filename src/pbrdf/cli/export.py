@@ -79,7 +79,7 @@ def export(
 
     Two wavelengths: `pbrdf export blue.json red.json --wavelength 476 --wavelength 650 -o paint.pbsdf`
     """
-    import pbrdf
+    from pbrdf.backend import set_backend
     from pbrdf.data import write
     from pbrdf.rendering.export import grid_dataset, write_merl, write_pbsdf
 
@@ -94,7 +94,7 @@ def export(
         )
     require_folder_of(target)
     if backend is not None:
-        pbrdf.set_backend(backend)
+        set_backend(backend)
     models = [open_single_model(source) for source in sources]
     if kind is Format.merl:
         with progress_bar("Tabulating", quiet) as progress:

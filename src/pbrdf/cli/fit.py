@@ -188,18 +188,18 @@ def fit(
     for folder in folders:
         require_writable(folder)
     if backend is not None:
-        import pbrdf
+        from pbrdf.backend import set_backend
 
-        pbrdf.set_backend(backend)
+        set_backend(backend)
     chosen = _model(model)
 
-    import pbrdf
+    from pbrdf.inversion import fit as fit_dataset
 
     for file, folder in zip(files, folders, strict=True):
         dataset = reading.open(file)
         try:
             with progress_bar(f"Fitting {file}", quiet) as progress:
-                result = pbrdf.fit(dataset, chosen, progress=progress, **arguments)
+                result = fit_dataset(dataset, chosen, progress=progress, **arguments)
                 checks = run_checks(
                     result,
                     dataset,

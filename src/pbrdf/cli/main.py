@@ -13,7 +13,6 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-import pbrdf
 from pbrdf.cli.calibrate import calibrate
 from pbrdf.cli.check import check
 from pbrdf.cli.console import fail
@@ -31,6 +30,7 @@ from pbrdf.cli.render import render
 from pbrdf.cli.reproduce import reproduce
 from pbrdf.cli.simulate import simulate
 from pbrdf.errors import PbrdfError
+from pbrdf.version import __version__
 
 __all__ = ["app", "main"]
 
@@ -67,7 +67,7 @@ app = typer.Typer(
 
 def _show_version(wanted: bool) -> None:
     if wanted:
-        print(f"pbrdf {pbrdf.__version__}")
+        print(f"pbrdf {__version__}")
         raise typer.Exit
 
 

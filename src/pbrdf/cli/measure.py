@@ -120,7 +120,7 @@ def measure(
 
     Of a plan: `pbrdf measure white --angles plan.csv -o planned && pbrdf fit planned/white.nc`
     """
-    import pbrdf
+    from pbrdf.backend import set_backend
     from pbrdf.instruments.goniometer.source import AngleErrors, Source
     from pbrdf.instruments.virtual.experiment import VirtualExperiment
     from pbrdf.instruments.virtual.measurement_folder import require_new, write_measurement
@@ -129,7 +129,7 @@ def measure(
         raise PbrdfError(f"--wavelength {wavelength:g}: give a wavelength above 0 in nm")
     require_new(output)
     if backend is not None:
-        pbrdf.set_backend(backend)
+        set_backend(backend)
     taken = open_instrument(instrument)
     if bits is not None:
         taken = replace(taken, detector=_with_bits(taken.detector, bits))

@@ -106,7 +106,7 @@ def plan(
     """
     import numpy as np
 
-    import pbrdf
+    from pbrdf.backend import set_backend
     from pbrdf.instruments.goniometer.angle_table import write_angles
     from pbrdf.planning import candidates
     from pbrdf.planning.plan import plan as make_plan
@@ -122,7 +122,7 @@ def plan(
     for file in (output, picture):
         require_folder_of(file)
     if backend is not None:
-        pbrdf.set_backend(backend)
+        set_backend(backend)
     model = open_model(source)
     taken = open_instrument(instrument or "paper") if noise is None else noise
     choose = candidates.out_of_plane_candidates if out_of_plane else candidates.in_plane_candidates

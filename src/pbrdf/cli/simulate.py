@@ -80,9 +80,10 @@ def simulate(
 
     A measurement: `pbrdf simulate model.json --bistatic 60,80,100 --noise 0.01 -o run.csv`
     """
-    import pbrdf
-    from pbrdf.data import write
+    from pbrdf.backend import set_backend
+    from pbrdf.data import make_dataset, write
     from pbrdf.inversion.noise import parse_noise
+    from pbrdf.version import __version__
 
     if plane and bistatic is not None:
         raise PbrdfError("--plane and --bistatic exclude each other: choose one")
@@ -101,14 +102,14 @@ def simulate(
     # The absolute part that a fit assumes is for real data with stray light: none is added here unasked.
     stated = None if noise is None else parse_noise(f"{noise},0" if _PLAIN_NUMBER.fullmatch(noise) else noise)
     if backend is not None:
-        pbrdf.set_backend(backend)
+        set_backend(backend)
     model = open_single_model(source)
 
     directions = directions_of(theta_i, theta_r, phi, plane, bistatic)
     columns, std = _evaluate(model, directions, light, mueller, stated, seed)
     if wavelength is None:
         wavelength = known_wavelength(source)
-    dataset = pbrdf.make_dataset(
+    dataset = make_dataset(
         directions["theta_i"],
         directions["theta_r"],
         directions["phi"],
@@ -121,7 +122,7 @@ def simulate(
         simulated=True,
         attrs={
             "title": f"Simulation with {source} (model {model.name})",
-            "source": f"SIMULATED by pbrdf {pbrdf.__version__}: {model!r}"
+            "source": f"SIMULATED by pbrdf {__version__}: {model!r}"
             + (f", noise {stated}, seed {seed}" if stated else ", without noise"),
         },
     )

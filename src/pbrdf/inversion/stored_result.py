@@ -1,4 +1,4 @@
-"""A fit in one file, so that it can be taken up again: netCDF for the arrays, JSON in its attribute ``fit`` for the rest.
+"""A fit in one file, to be taken up again: netCDF for the arrays, JSON in its attribute ``fit`` for the rest.
 
 Numbers come back bit for bit. The arrays over geometries, starts and parameters are variables of the root group; the
 comparison of measured and modelled values is the group ``comparison``. Angles are in radians.
@@ -53,14 +53,19 @@ def write_result(result: FitResult, path: Path) -> None:
 
     data = result.data
     columns: dict[str, Any] = {
-        name: (dims, getattr(data, name)) for name, dims in _OBSERVED.items() if getattr(data, name) is not None
+        name: (dims, getattr(data, name))
+        for name, dims in _OBSERVED.items()
+        if getattr(data, name) is not None
     }
     columns |= {name: (dims, getattr(result, name)) for name, dims in _STARTS.items()}
     columns["unknowns"] = ("free", result.unknowns)
     columns["information"] = (("free", "other_free"), result.information)
     columns["correlation_of_parameters"] = (("inside", "other_inside"), result.correlation.values)
     arrays = xr.Dataset(columns, coords={"channel": list(data.channels), "free": result.space.names})
-    arrays.attrs = {"title": f"{result.model.name} fitted", "fit": json.dumps(_record(result), ensure_ascii=False)}
+    arrays.attrs = {
+        "title": f"{result.model.name} fitted",
+        "fit": json.dumps(_record(result), ensure_ascii=False),
+    }
     arrays.to_netcdf(path, engine="h5netcdf")
     comparison = result.comparison.copy()
     for name in [str(n) for n in comparison.data_vars if comparison[n].dtype == bool]:
@@ -160,8 +165,9 @@ def _result(record: Mapping[str, Any], arrays: xr.Dataset, comparison: xr.Datase
         loss=described["loss"],
     )
     observed = record["observations"]
+    columns: dict[str, Any] = {name: arrays[name].values if name in arrays else None for name in _OBSERVED}
     data = Observations(
-        **{name: arrays[name].values if name in arrays else None for name in _OBSERVED},
+        **columns,
         channels=tuple(observed["channels"]),
         illumination=tuple(observed["illumination"]),
         std_known=observed["std_known"],

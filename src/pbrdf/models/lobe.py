@@ -20,9 +20,9 @@ _TILTS, _DIFFERENCE = np.geomspace(1e-4, 1.0, 600), math.radians(30.0)
 def measured_lobe_width(model: evaluation.Evaluable) -> float:
     """Slope standard deviation of the Gaussian whose half width at half maximum the specular lobe has at θ_d = 30°.
 
-    That is the tangent of θ_h at which the density of the facets' slopes, f00 cosθ_i cosθ_r cos⁴θ_h of the specular part
-    but for Fresnel reflectance and shadowing, has fallen to half, divided by √(2 ln 2). For a long-tailed lobe it is the
-    width of the core.
+    That is the tangent of θ_h at which the density of the facets' slopes (f00 cosθ_i cosθ_r cos⁴θ_h of the specular
+    part, but for Fresnel reflectance and shadowing) has fallen to half, divided by √(2 ln 2). For a long-tailed lobe it
+    is the width of the core.
 
     Parameters
     ----------

@@ -12,7 +12,6 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-import pbrdf
 from pbrdf.data.build import make_dataset
 from pbrdf.data.formats.merl import COLOURS, SHAPE, cell_centres, write_planes
 from pbrdf.data.formats.pbsdf import MOST_WAVELENGTHS, SIMULATED, PolarizedTable, write_table
@@ -20,6 +19,7 @@ from pbrdf.errors import DataError, ModelError
 from pbrdf.models import Model
 from pbrdf.optics.half_difference import directions
 from pbrdf.rendering.tabulation import TableError, refined_table
+from pbrdf.version import __version__
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -130,7 +130,7 @@ def write_pbsdf(
         progress=progress,
     )
     described = "; ".join(f"{wavelength} nm {model!r}" for wavelength, model in ordered.items())
-    table = replace(table, description=f"{SIMULATED} {pbrdf.__version__}: {described}")
+    table = replace(table, description=f"{SIMULATED} {__version__}: {described}")
     write_table(table, path)
     width = min(float(model.lobe_width()) for model in ordered.values())
     return PbsdfExport(
@@ -237,7 +237,7 @@ def grid_dataset(
         simulated=True,
         attrs={
             "title": f"Mueller matrices of the model {', '.join(dict.fromkeys(m.name for m in given))}",
-            "source": f"{SIMULATED} {pbrdf.__version__}: {'; '.join(map(repr, given))}, without noise",
+            "source": f"{SIMULATED} {__version__}: {'; '.join(map(repr, given))}, without noise",
         },
     )
 

@@ -183,5 +183,16 @@ def test_an_overview_has_a_column_for_each_series(tmp_path):
 def test_a_picture_without_a_good_pixel_can_be_drawn(tmp_path):
     nothing = np.full((4, 5), np.nan)
     picture = Picture(nothing, nothing, nothing, nothing, np.ones((4, 5), int), (4, 5), 1)
-    save_figure(quicklook_figure(picture, "white"), tmp_path / "white.png")
-    save_figure(overview_figure([picture], ["1"], "white"), tmp_path / "whites.png")
+    figures = {
+        "white.png": quicklook_figure(picture, "white"),
+        "all.png": overview_figure([picture], ["1"], "white"),
+    }
+    for name, figure in figures.items():
+        save_figure(figure, tmp_path / name)
+        assert (tmp_path / name).stat().st_size > 1000
+        assert [text.get_text() for text in figure.legends[0].get_texts()] == ["saturated"]
+    figure = figures["white.png"]
+    figure.canvas.draw()
+    for ax in panels(figure):
+        shown = colours_at(figure, ax, [(1.5, 0.5), (4.5, 0.5), (2.5, 2.5), (4.5, 3.5)])
+        np.testing.assert_allclose(shown, [to_rgb("#FF5A00")] * 4, atol=0.02)

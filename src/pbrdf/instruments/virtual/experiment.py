@@ -29,6 +29,7 @@ from pbrdf.instruments.virtual.miscalibration import miscalibrated
 from pbrdf.models.base import Model
 from pbrdf.models.extended_source import stokes_under_disc
 from pbrdf.optics.elements import rotate_frame
+from pbrdf.version import __version__
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -236,7 +237,6 @@ class Measurement:
         DataError
             As :func:`~pbrdf.instruments.reduction.series.goniometric_datasets`.
         """
-        import pbrdf
 
         found = goniometric_datasets(
             self.frames,
@@ -249,7 +249,7 @@ class Measurement:
         for name, dataset in found.items():
             dataset.attrs["title"] = f"Virtual measurement of {name}"
             dataset.attrs["source"] = (
-                f"SIMULATED frames by pbrdf {pbrdf.__version__}: {self.samples[name]!r}, seed {self.experiment.seed}"
+                f"SIMULATED frames by pbrdf {__version__}: {self.samples[name]!r}, seed {self.experiment.seed}"
             )
         return found
 

@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-import pbrdf
 from pbrdf.data.formats.storage import exact_degrees, name_beside
 from pbrdf.errors import DataError
 from pbrdf.report.fit.subject import Report
 from pbrdf.report.fit.summary import summary_text
 from pbrdf.report.numbers import plain, shown_unit
+from pbrdf.version import __version__
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -147,7 +147,7 @@ def fit_record(report: Report) -> dict[str, Any]:
     result = report.result
     factor = {name: shown_unit(e.parameter)[0] for name, e in result.estimates.items()}
     record = {
-        "pbrdf": pbrdf.__version__,
+        "pbrdf": __version__,
         "data": {
             "name": report.name,
             **{
@@ -210,7 +210,7 @@ def comparison_file(report: Report) -> xr.Dataset:
         )
     ds.attrs = {
         "title": f"{result.model.name} fitted to {report.name}",
-        "source": f"pbrdf {pbrdf.__version__}",
+        "source": f"pbrdf {__version__}",
         "data": str(report.dataset.attrs.get("title", report.name)),
         "model": json.dumps(result.model.to_dict(), ensure_ascii=False),
         "noise": result.noise,

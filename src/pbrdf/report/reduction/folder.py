@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 
-import pbrdf
 from pbrdf.data.readers import write
 from pbrdf.errors import DataError
 from pbrdf.instruments.frames.frames import Frames
@@ -23,6 +22,7 @@ from pbrdf.report.fit.folder import complete_folder
 from pbrdf.report.reduction.gallery import Gallery, safe_name
 from pbrdf.report.reduction.picture_sums import BlockSums
 from pbrdf.report.reduction.summary import write_averages
+from pbrdf.version import __version__
 
 __all__ = ["WHOLE_PICTURE", "Reduction", "Wanted", "write_reduction"]
 
@@ -118,7 +118,7 @@ def write_reduction(
             maps: MapWriter | None = None
             if wanted.maps is not None:
                 names.append(f"stokes.{wanted.maps}")
-                described = {"title": f"Stokes parameters of {name}", "source": f"pbrdf {pbrdf.__version__}"}
+                described = {"title": f"Stokes parameters of {name}", "source": f"pbrdf {__version__}"}
                 maps = MapWriter(
                     temporary / names[-1], frames, instrument, angles=wanted.angles, attrs=described
                 )
@@ -148,7 +148,7 @@ def write_reduction(
         names.insert(0, "summary.csv")
         if wanted.angles is not None:
             measured = {region: averages[region] for region in wanted.regions}
-            attrs = {"source": f"{name}, reduced by pbrdf {pbrdf.__version__}"}
+            attrs = {"source": f"{name}, reduced by pbrdf {__version__}"}
             datasets = datasets_of_averages(measured, frames.names, instrument, wanted.angles, attrs=attrs)
             for region, dataset in datasets.items():
                 write(dataset, temporary / f"{file_names[region]}{wanted.datasets}")

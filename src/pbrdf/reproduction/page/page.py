@@ -7,7 +7,6 @@ from collections.abc import Iterator, Sequence
 from html import escape
 from pathlib import Path
 
-import pbrdf
 from pbrdf.report.numbers import brief
 from pbrdf.reproduction import paper
 from pbrdf.reproduction.experiment.sample import Sample
@@ -25,6 +24,7 @@ from pbrdf.reproduction.result import Reproduction
 from pbrdf.reproduction.statements.catalogue import Evaluated
 from pbrdf.reproduction.statements.parameters import agreement
 from pbrdf.reproduction.statements.statement import Kind
+from pbrdf.version import __version__
 
 __all__ = ["page_text", "verdicts_in_words"]
 
@@ -75,7 +75,7 @@ def _parts(reproduction: Reproduction, folder: Path) -> Iterator[str]:
         "table 1 are measured in a simulation (frames of the imager, reduced to Stokes vectors), inverted the "
         "paper's way, and each of its statements that follows from the model is tested."
     )
-    yield paragraph(f"Settings: {options.in_words()}. pbrdf {pbrdf.__version__}.")
+    yield paragraph(f"Settings: {options.in_words()}. pbrdf {__version__}.")
     yield (
         "<ul>"
         + "".join(f"<li>{escape(line)}</li>" for line in verdicts_in_words(reproduction.statements))

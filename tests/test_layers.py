@@ -1,0 +1,54 @@
+"""What the contracts in ``pyproject.toml`` cannot say of the imports inside the package."""
+
+from __future__ import annotations
+
+import grimp
+import pytest
+
+
+@pytest.fixture(scope="module")
+def graph():
+    """Which module imports which, those for type checkers and those inside functions too."""
+    return grimp.build_graph("pbrdf", cache_dir=None)
+
+
+def circles(imports):
+    """Strongly connected modules, by Tarjan's algorithm; `imports` maps each module to those that it imports."""
+    order, low, stack, found = {}, {}, [], []
+
+    def visit(module):
+        order[module] = low[module] = len(order)
+        stack.append(module)
+        for other in sorted(imports[module]):
+            if other not in order:
+                visit(other)
+            if other in stack:
+                low[module] = min(low[module], low[other])
+        if low[module] == order[module]:
+            place = stack.index(module)
+            members = stack[place:]
+            del stack[place:]
+            if len(members) > 1:
+                found.append(sorted(members))
+
+    for module in sorted(imports):
+        if module not in order:
+            visit(module)
+    return found
+
+
+def test_circles_are_found():
+    assert circles({"a": {"b"}, "b": {"c"}, "c": {"b", "d"}, "d": set()}) == [["b", "c"]]
+    assert circles({"a": {"b"}, "b": {"c"}, "c": {"a"}, "d": {"a"}}) == [["a", "b", "c"]]
+    assert circles({"a": {"b", "c"}, "b": {"c"}, "c": set()}) == []
+
+
+def test_no_circle_of_files(graph):
+    """A package's ``__init__`` and its own modules too, which the contract on siblings leaves out."""
+    assert (
+        circles({module: graph.find_modules_directly_imported_by(module) for module in graph.modules}) == []
+    )
+
+
+def test_nothing_inside_imports_the_front_door(graph):
+    assert graph.find_modules_that_directly_import("pbrdf") == set()
