@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 from pbrdf.backend import get_backend, point_drjit_to_llvm, set_backend
 from pbrdf.errors import BackendError, DataError, FitError, ModelError, PbrdfError
+from pbrdf.presentation import provide_presenter
 from pbrdf.version import __version__
 
 if TYPE_CHECKING:
@@ -55,7 +56,16 @@ if TYPE_CHECKING:
     from pbrdf.inversion.bootstrap import bootstrap
     from pbrdf.inversion.identifiability import identifiability
     from pbrdf.inversion.profile import contour, profile
-    from pbrdf.models import DoubleGauss, Model, ReciprocalDoubleGauss, load_model
+    from pbrdf.inversion.stored_result import load_fit
+    from pbrdf.models import (
+        DoubleGauss,
+        Model,
+        Option,
+        Parameter,
+        ReciprocalDoubleGauss,
+        load_model,
+        register,
+    )
     from pbrdf.models.reflectance import directional_hemispherical_reflectance
     from pbrdf.optics.mueller import coherency_eigenvalues
     from pbrdf.optics.stokes import aolp, docp, dolp, dop
@@ -72,6 +82,9 @@ _HOME = {
     "DoubleGauss": "pbrdf.models",
     "ReciprocalDoubleGauss": "pbrdf.models",
     "Model": "pbrdf.models",
+    "Parameter": "pbrdf.models",
+    "Option": "pbrdf.models",
+    "register": "pbrdf.models",
     "load_model": "pbrdf.models",
     "load_paint": "pbrdf.data.paints",
     "PAINTS": "pbrdf.data.paints",
@@ -94,6 +107,7 @@ _HOME = {
     "NoiseModel": "pbrdf.inversion",
     "Nuisance": "pbrdf.inversion",
     "HoldOut": "pbrdf.inversion",
+    "load_fit": "pbrdf.inversion.stored_result",
     # how far to trust a fit
     "profile": "pbrdf.inversion.profile",
     "contour": "pbrdf.inversion.profile",
@@ -148,6 +162,8 @@ __all__ = [
     "ModelError",
     "NoiseModel",
     "Nuisance",
+    "Option",
+    "Parameter",
     "PbrdfError",
     "Polarimeter",
     "Protocol",
@@ -173,6 +189,7 @@ __all__ = [
     "goniometric_datasets",
     "identifiability",
     "lcvr",
+    "load_fit",
     "load_instrument",
     "load_model",
     "load_paint",
@@ -186,6 +203,7 @@ __all__ = [
     "profile",
     "read",
     "reduce_frames",
+    "register",
     "register_bsdf",
     "render_stokes",
     "retardance_set",
@@ -201,6 +219,7 @@ __all__ = [
 ]
 
 point_drjit_to_llvm()
+provide_presenter("fit", lambda: importlib.import_module("pbrdf.report.fit.presenter"))
 
 
 def __getattr__(name: str) -> Any:

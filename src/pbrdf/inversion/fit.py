@@ -234,6 +234,7 @@ def _summarise(
         name="correlation",
     )
     result = FitResult(
+        dataset=dataset,
         model=model,
         estimates=estimates,
         correlation=names,

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["Optimum"]
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Optimum:
     """A model at the best fit to its data, with the curvature of χ² there.
 

@@ -1,12 +1,14 @@
 """A fit in one file, to be taken up again: netCDF for the arrays, JSON in its attribute ``fit`` for the rest.
 
 Numbers come back bit for bit. The arrays over geometries, starts and parameters are variables of the root group; the
-comparison of measured and modelled values is the group ``comparison``. Angles are in radians.
+comparison of measured and modelled values is the group ``comparison``, the data set as it was given the group ``data``.
+Angles are in radians but for those of the data set, which is stored as in a file of its own.
 """
 
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -14,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pbrdf.data.formats.stored import from_stored, to_stored
 from pbrdf.errors import DataError, ModelError
 from pbrdf.inversion.estimates import DistinctOptimum, Estimate
 from pbrdf.inversion.holdout import HoldOut, Prediction
@@ -28,7 +31,10 @@ from pbrdf.models.parameters import Parameter
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["FORMAT", "read_result", "write_result"]
+__all__ = ["FILE_NAME", "FORMAT", "load_fit", "read_result", "write_result"]
+
+#: Name of the file in the folder of a fit.
+FILE_NAME = "fit.nc"
 
 #: Version of the file's layout.
 FORMAT = 1
@@ -71,6 +77,35 @@ def write_result(result: FitResult, path: Path) -> None:
     for name in [str(n) for n in comparison.data_vars if comparison[n].dtype == bool]:
         comparison[name] = comparison[name].astype(np.int8).assign_attrs(flag="1 is true")
     comparison.to_netcdf(path, mode="a", group="comparison", engine="h5netcdf")
+    to_stored(result.dataset).to_netcdf(path, mode="a", group="data", engine="h5netcdf")
+
+
+def load_fit(folder: str | os.PathLike[str]) -> FitResult:
+    """Bring back a fit that :meth:`FitResult.save` or ``pbrdf fit`` wrote.
+
+    Parameters
+    ----------
+    folder
+        The folder of the fit, or the file ``fit.nc`` in it.
+
+    Returns
+    -------
+    FitResult
+        As it was, bit for bit: it can be profiled, drawn, and predict again.
+
+    Raises
+    ------
+    DataError
+        If there is no fit, or the file cannot be read.
+    ModelError
+        If it is of a model that is not known here: register it first.
+    """
+    path = Path(folder)
+    if path.is_dir():
+        path /= FILE_NAME
+    if not path.is_file():
+        raise DataError(f"{path}: there is no such file; give the folder that a fit was saved in")
+    return read_result(path)
 
 
 def read_result(path: Path) -> FitResult:
@@ -89,14 +124,15 @@ def read_result(path: Path) -> FitResult:
         with (
             xr.open_dataset(path, engine="h5netcdf") as stored,
             xr.open_dataset(path, engine="h5netcdf", group="comparison") as compared,
+            xr.open_dataset(path, engine="h5netcdf", group="data", decode_times=False) as measured,
         ):
-            arrays, comparison = stored.load(), compared.load()
+            arrays, comparison, dataset = stored.load(), compared.load(), measured.load()
         record = json.loads(arrays.attrs["fit"])
         if record["format"] != FORMAT:
             raise DataError(
                 f"{path}: the fit is stored in format {record['format']}, this version reads format {FORMAT}: fit again"
             )
-        return _result(record, arrays, comparison)
+        return _result(record, arrays, comparison, from_stored(dataset, path))
     except ModelError as error:
         raise ModelError(f"{path}: {error}") from error
     except OSError as error:
@@ -148,7 +184,9 @@ def _plain(label: Any) -> Any:
     return label.item() if isinstance(label, np.generic) else label
 
 
-def _result(record: Mapping[str, Any], arrays: xr.Dataset, comparison: xr.Dataset) -> FitResult:
+def _result(
+    record: Mapping[str, Any], arrays: xr.Dataset, comparison: xr.Dataset, dataset: xr.Dataset
+) -> FitResult:
     import xarray as xr
 
     for name in record["flags"]:
@@ -181,6 +219,7 @@ def _result(record: Mapping[str, Any], arrays: xr.Dataset, comparison: xr.Datase
     )
     hold_out = record["hold_out"]
     return FitResult(
+        dataset=dataset,
         model=load_model(record["model"]),
         estimates={
             name: Estimate(**{**e, "parameter": _parameter(e["parameter"])})

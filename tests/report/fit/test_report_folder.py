@@ -17,7 +17,7 @@ from pbrdf.report.fit.folder import (
     write_report,
 )
 
-NAMES = {"summary.txt", "figure.png", "model.json", "fit.json", "comparison.nc", "starts.png"}
+NAMES = {"summary.txt", "figure.png", "model.json", "fit.json", "comparison.nc", "starts.png", "fit.nc"}
 
 
 @pytest.fixture(scope="module")

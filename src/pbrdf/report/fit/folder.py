@@ -14,6 +14,7 @@ import numpy as np
 
 from pbrdf.data.formats.storage import exact_degrees, name_beside
 from pbrdf.errors import DataError
+from pbrdf.inversion.stored_result import FILE_NAME, write_result
 from pbrdf.report.fit.subject import Report
 from pbrdf.report.fit.summary import summary_text
 from pbrdf.report.numbers import plain, shown_unit
@@ -87,7 +88,7 @@ def write_report(report: Report, directory: Path, *, figure_format: str = "png")
     from pbrdf.report.style import save_figure
 
     names = ["summary.txt", f"figure.{figure_format}", "model.json", "fit.json", "comparison.nc"]
-    names.append(f"starts.{figure_format}")
+    names += [f"starts.{figure_format}", FILE_NAME]
     with complete_folder(directory) as temporary:
         (temporary / "summary.txt").write_text(summary_text(report), encoding="utf-8")
         save_figure(fit_figure(report), temporary / f"figure.{figure_format}")
@@ -96,6 +97,7 @@ def write_report(report: Report, directory: Path, *, figure_format: str = "png")
         (temporary / "fit.json").write_text(record + "\n", encoding="utf-8")
         comparison_file(report).to_netcdf(temporary / "comparison.nc", engine="h5netcdf")
         save_figure(starts_figure(report), temporary / f"starts.{figure_format}")
+        write_result(report.result, temporary / FILE_NAME)
         if report.checks is not None and report.checks.contours:
             save_figure(contour_figure(report), temporary / f"contours.{figure_format}")
             names.append(f"contours.{figure_format}")

@@ -1,0 +1,84 @@
+"""A fit as it shows itself in Python: its text, its table in a notebook, its figure, its folder."""
+
+from __future__ import annotations
+
+import math
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pbrdf.inversion.estimates import Estimate
+from pbrdf.inversion.holdout import Prediction
+from pbrdf.inversion.result import FitResult
+from pbrdf.report.fit.checks import run_checks
+from pbrdf.report.fit.figure import fit_figure
+from pbrdf.report.fit.folder import require_writable, write_report
+from pbrdf.report.fit.subject import Report
+from pbrdf.report.fit.summary import summary_text
+from pbrdf.report.numbers import brief, per_cent, shown_unit, with_error
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["figure", "html", "save", "summary"]
+
+#: What data without a title are called.
+_UNNAMED = "data"
+
+
+def summary(result: FitResult, *, verbose: bool = False) -> str:
+    """What ``pbrdf fit`` prints, with the checks that it makes for every fit."""
+    return summary_text(_report(result), verbose=verbose)
+
+
+def html(result: FitResult) -> str:
+    """A table of the parameters, and in a line each how well they describe and predict the data."""
+    rows = "".join(_row(name, estimate) for name, estimate in result.estimates.items())
+    head = "".join(f"<th>{title}</th>" for title in ("parameter", "value", "unit", "verdict", "meaning"))
+    sentences = [f"{result.model.name} fitted to {result.goodness.data} values of {_name(result)}"]
+    sentences += _errors("fitted", result.fitted) + _errors("held out, predicted", result.predicted)
+    lines = "".join(f"<p>{escape(sentence)}</p>" for sentence in [*sentences, *result.notes])
+    return f"<div><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>{lines}</div>"
+
+
+def figure(result: FitResult) -> Figure:
+    """Measured points with the fitted model."""
+    return fit_figure(_report(result, checked=False))
+
+
+def save(result: FitResult, folder: Path, figure_format: str = "png") -> list[Path]:
+    """Write the folder of ``pbrdf fit``."""
+    require_writable(folder)
+    return write_report(_report(result), folder, figure_format=figure_format)
+
+
+def _report(result: FitResult, *, checked: bool = True) -> Report:
+    checks = run_checks(result, result.dataset) if checked else None
+    return Report(result, result.dataset, _name(result), checks=checks)
+
+
+def _name(result: FitResult) -> str:
+    return str(result.dataset.attrs.get("title") or _UNNAMED)
+
+
+def _errors(what: str, by_region: dict[str, Prediction]) -> list[str]:
+    """One sentence on the errors of the intensity and the degree of polarisation."""
+    if "all" not in by_region:
+        return []
+    errors = by_region["all"]
+    sentence = f"{what}: median error of the intensity {per_cent(errors.intensity_median)}"
+    if math.isfinite(errors.dolp_rms):
+        sentence += f", rms error of the degree of linear polarisation {brief(errors.dolp_rms, 2)}"
+    return [sentence]
+
+
+def _row(name: str, estimate: Estimate) -> str:
+    factor, unit = shown_unit(estimate.parameter)
+    cells = (
+        name,
+        with_error(factor * estimate.value, factor * estimate.std),
+        unit,
+        estimate.verdict,
+        estimate.parameter.description,
+    )
+    return f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in cells)}</tr>"
