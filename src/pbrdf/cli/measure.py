@@ -135,7 +135,8 @@ def measure(
     """
     import pbrdf
     from pbrdf.data.paints import PAINTS, WAVELENGTH
-    from pbrdf.instruments.goniometer.source import AngleErrors, Source
+    from pbrdf.instruments.goniometer.angle_errors import AngleErrors
+    from pbrdf.instruments.goniometer.source import Source
     from pbrdf.instruments.virtual.experiment import VirtualExperiment
     from pbrdf.instruments.virtual.measurement_folder import require_new, write_measurement
 

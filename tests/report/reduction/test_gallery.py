@@ -5,6 +5,7 @@ import pytest
 
 from pbrdf.instruments.frames.frames import ArrayFrames
 from pbrdf.instruments.reduction.stokes_image import StokesImage
+from pbrdf.instruments.reduction.streaming import Block
 from pbrdf.report.reduction import gallery
 from pbrdf.report.reduction.gallery import Gallery, safe_name
 from pbrdf.report.reduction.quicklook import overview_figure
@@ -19,11 +20,11 @@ def image(level, rows=6, columns=5):
 
 def drawn(tmp_path, names):
     frames = ArrayFrames(np.zeros((len(names), 4, 6, 5), np.uint16), names)
-    made = Gallery(frames, tmp_path, "run", {})
-    for series in range(len(names)):
-        for first in (0, 3):
-            made.add(series, made.sums(series, first, image(100.0 + series, rows=3)))
-    made.close()
+    with Gallery(frames, tmp_path, "run", {}) as made:
+        for series in range(len(names)):
+            for first in (0, 3):
+                block = Block(series, first, first + 3, image(100.0 + series, rows=3))
+                made.add(block, made.prepare(block))
     assert sorted(made.files) == sorted(path.name for path in tmp_path.iterdir())
     return made.files
 
