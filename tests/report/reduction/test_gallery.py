@@ -55,6 +55,18 @@ def test_names_that_a_file_cannot_have(tmp_path):
     assert drawn(tmp_path, ("a/b", "a:b")) == ["overview.png", "picture_a_b.png", "picture_a_b_2.png"]
 
 
+def test_an_error_leaves_no_pictures(tmp_path):
+    frames = ArrayFrames(np.zeros((2, 4, 6, 5), np.uint16), ("a", "b"))
+    (tmp_path / "other.png").touch()
+    with pytest.raises(RuntimeError), Gallery(frames, tmp_path, "run", {}) as made:
+        for series in range(2):
+            block = Block(series, 0, 6, image(100.0))
+            made.add(block, made.prepare(block))
+        assert (tmp_path / "picture_a.png").exists()
+        raise RuntimeError
+    assert [path.name for path in tmp_path.iterdir()] == ["other.png"]
+
+
 @pytest.mark.parametrize(
     ("name", "file"), [("white paint", "white_paint"), ("θ=30°", "θ_30"), ("../x", "x"), ("...", "unnamed")]
 )
