@@ -177,8 +177,8 @@ def test_from_frames_to_a_map_that_reduces_pictures():
         ],
         axis=1,
     )
-    readings = cell_means(frames, DETECTOR, cells=(4, 4), flat=flat)
-    found = calibrate(readings.intensities, levels, variance=readings.variance)
+    means = cell_means(frames, DETECTOR, cells=(4, 4), flat=flat)
+    found = calibrate(means.intensities, levels, variance=means.variance)
     light = np.array([5000.0, 2000.0, -1500.0, 1000.0])
     signal = truth.intensities(light[:, None, None] * np.ones((4, *shape))) * flat
     image = reduce_frames(DETECTOR.expose(signal, rng), found.polarimeter, DETECTOR, flat=flat)

@@ -28,7 +28,7 @@ def frames_at_inputs(polarimeter, level, shape, seed=0):
 
 
 @pytest.mark.parametrize("cells", [(1, 1), (2, 3), None])
-def test_readings_are_means_over_cells(cells):
+def test_means_are_over_the_pixels_of_each_cell(cells):
     """Means and their variance over exactly the pixels that the map's cell serves (10 × 11 pixels, cells uneven)."""
     rng = np.random.default_rng(4)
     frames = rng.integers(100, 2000, size=(2, 3, 10, 11)).astype(np.uint16)

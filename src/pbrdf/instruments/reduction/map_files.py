@@ -91,13 +91,14 @@ class MapWriter:
 
     def __init__(
         self,
-        path: Path,
+        path: str | Path,
         frames: Frames,
         instrument: Instrument,
         *,
         angles: AngleTable | None = None,
         attrs: dict[str, Any] | None = None,
     ) -> None:
+        path = Path(path)
         self._kind = path.suffix.lower()
         if self._kind not in (".nc", ".zarr"):
             raise DataError(f"{path}: Stokes pictures are written as .nc or .zarr")

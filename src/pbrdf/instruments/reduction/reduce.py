@@ -39,12 +39,17 @@ class Sink(Protocol[Part]):
         ...
 
     def prepare(self, block: Block) -> Part:
-        """What the sink needs of a block. Several threads call this at once, in any order."""
+        """What the sink needs of a block, which should take no more memory than the block: a few wait to be added.
+
+        Several threads call this at once, in any order.
+        """
         ...
 
     def add(self, block: Block, part: Part) -> None:
-        """Take in a block and what :meth:`prepare` made of it. The main thread calls this in the order of series and
-        rows."""
+        """Take in a block and what :meth:`prepare` made of it.
+
+        The main thread calls this in the order of series and rows.
+        """
         ...
 
     def __exit__(
@@ -71,7 +76,7 @@ def reduce(
     frames, instrument
         What was measured, and with what.
     sinks
-        One or more; the rows that none of them needs are not read.
+        One or more, which are left in the reverse order; rows that none of them needs are not read.
     dark_level, weighted, max_memory, progress
         See :func:`pbrdf.instruments.reduction.streaming.reduced_blocks`.
 
