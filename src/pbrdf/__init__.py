@@ -40,7 +40,8 @@ if TYPE_CHECKING:
     from pbrdf.instruments.polarimeter.polarization_errors import polarization
     from pbrdf.instruments.polarimeter.presets import preset
     from pbrdf.instruments.polarimeter.retardance_sets import retardance_set
-    from pbrdf.instruments.reduction.series import goniometric_datasets
+    from pbrdf.instruments.reduction.goniometric_datasets import goniometric_datasets
+    from pbrdf.instruments.reduction.reduce import reduce
     from pbrdf.instruments.reduction.stokes_image import reduce_frames
     from pbrdf.instruments.virtual.experiment import VirtualExperiment
     from pbrdf.inversion import (
@@ -133,7 +134,8 @@ _HOME = {
     "calibrate_instrument": "pbrdf.instruments.calibration.instrument_calibration",
     # frames to Stokes parameters to data sets
     "reduce_frames": "pbrdf.instruments.reduction.stokes_image",
-    "goniometric_datasets": "pbrdf.instruments.reduction.series",
+    "reduce": "pbrdf.instruments.reduction.reduce",
+    "goniometric_datasets": "pbrdf.instruments.reduction.goniometric_datasets",
     "polarization": "pbrdf.instruments.polarimeter.polarization_errors",
     # goniometer: what to measure, and the measurement simulated
     "Protocol": "pbrdf.instruments.goniometer.protocols",
@@ -202,6 +204,7 @@ __all__ = [
     "preset",
     "profile",
     "read",
+    "reduce",
     "reduce_frames",
     "register",
     "register_bsdf",

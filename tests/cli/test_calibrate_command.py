@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from pbrdf.instruments.calibration.known_inputs import standard_inputs
+from pbrdf.instruments.calibration.analyzer_calibration import standard_inputs
 from pbrdf.instruments.polarimeter.detector import Detector
 from pbrdf.instruments.polarimeter.instrument import Instrument
 from pbrdf.instruments.polarimeter.instrument_files import load_instrument, save_instrument

@@ -121,7 +121,8 @@ def measure(
     Of a plan: `pbrdf measure white --angles plan.csv -o planned && pbrdf fit planned/white.nc`
     """
     from pbrdf.backend import set_backend
-    from pbrdf.instruments.goniometer.source import AngleErrors, Source
+    from pbrdf.instruments.goniometer.angle_errors import AngleErrors
+    from pbrdf.instruments.goniometer.source import Source
     from pbrdf.instruments.virtual.experiment import VirtualExperiment
     from pbrdf.instruments.virtual.measurement_folder import require_new, write_measurement
 

@@ -13,11 +13,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pbrdf.errors import DataError
-from pbrdf.instruments.frames.frames import ArrayFrames, Frames, MosaicFrames
+from pbrdf.instruments.frames.frames import ArrayFrames, Frames
+from pbrdf.instruments.frames.mosaic import MosaicFrames
 from pbrdf.instruments.goniometer.rays import angles_of
 from pbrdf.instruments.polarimeter.instrument import Instrument
-from pbrdf.instruments.reduction.series import to_surface_frame
 from pbrdf.instruments.reduction.stokes_image import StokesImage
+from pbrdf.instruments.reduction.surface_axes import to_surface_axes
 from pbrdf.rendering.picture import StokesPicture
 
 if TYPE_CHECKING:
@@ -201,7 +202,7 @@ def pixel_dataset(
     Returns
     -------
     xarray.Dataset
-        Quantity ``brdf``, Stokes components that were determined, with their covariance, in the frame (p, s).
+        Quantity ``brdf``, Stokes components that were determined, with their covariance, in the axes (p, s).
 
     Raises
     ------
@@ -225,7 +226,7 @@ def pixel_dataset(
 
     theta_i = pick(geometry.theta_i)
     scale = exposure * intensity * np.cos(theta_i) / pick(geometry.distance) ** 2
-    stokes, covariance = to_surface_frame(
+    stokes, covariance = to_surface_axes(
         image.stokes.reshape(4, -1)[:, where].T / scale[:, None],
         image.covariance.reshape(4, 4, -1)[:, :, where].transpose(2, 0, 1) / scale[:, None, None] ** 2,
         # from p to the horizontal of the picture, the other way round

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pbrdf.errors import DataError
-from pbrdf.instruments.calibration.known_inputs import standard_inputs
+from pbrdf.instruments.calibration.analyzer_calibration import standard_inputs
 from pbrdf.instruments.calibration.settings_calibration import calibrate_model
 from pbrdf.instruments.polarimeter.band import in_band, top_hat_band
 from pbrdf.instruments.polarimeter.polarimeter import (

@@ -1,4 +1,4 @@
-"""The source and the errors of the goniometer's angles."""
+"""The light source of a goniometer."""
 
 from __future__ import annotations
 
@@ -6,40 +6,13 @@ import numpy as np
 import pytest
 
 from pbrdf.errors import DataError
-from pbrdf.instruments.goniometer.protocols import Protocol
-from pbrdf.instruments.goniometer.source import AngleErrors, Source
+from pbrdf.instruments.goniometer.source import Source
 
 
-def test_readings_scatter_by_the_stability():
-    readings = Source(stability=0.01).readings(20_000, np.random.default_rng(1))
-    assert readings.mean() == pytest.approx(1.0, abs=4 * 0.01 / np.sqrt(20_000))
-    assert readings.std() == pytest.approx(0.01, rel=0.03)
-
-
-def test_errors_of_camera_and_zero_stay_within_a_position():
-    protocol = Protocol.in_plane(np.deg2rad([50.0, 90.0]), np.deg2rad(np.arange(20.0, 80.0, 5.0)))
-    moved = AngleErrors(camera=0.01, zero=0.005).apply(protocol, np.random.default_rng(3))
-    for position in (1, 2):
-        rows = protocol.group == position
-        assert np.ptp((moved.theta_i - protocol.theta_i)[rows]) < 1e-12
-        assert np.ptp((moved.bistatic - protocol.bistatic)[rows]) < 1e-12
-    assert np.ptp(moved.theta_i - protocol.theta_i) > 1e-4
-
-
-def test_errors_of_the_sample_angle_differ_from_reading_to_reading():
-    protocol = Protocol.in_plane(np.deg2rad([50.0]), np.deg2rad(np.linspace(30.0, 80.0, 2000)))
-    moved = AngleErrors(sample=0.002).apply(protocol, np.random.default_rng(3))
-    assert (protocol.theta_i - moved.theta_i).std() == pytest.approx(0.002, rel=0.06)
-    np.testing.assert_allclose(moved.bistatic, protocol.bistatic, atol=1e-12)
-
-
-def test_one_kind_of_error_does_not_change_the_draws_of_another():
-    protocol = Protocol.in_plane()
-    alone, both = (
-        e.apply(protocol, np.random.default_rng(5))
-        for e in (AngleErrors(sample=1e-3), AngleErrors(sample=1e-3, camera=1e-3))
-    )
-    np.testing.assert_allclose(alone.theta_i, both.theta_i, atol=1e-12)
+def test_radiances_scatter_by_the_stability():
+    radiances = Source(stability=0.01).radiances(20_000, np.random.default_rng(1))
+    assert radiances.mean() == pytest.approx(1.0, abs=4 * 0.01 / np.sqrt(20_000))
+    assert radiances.std() == pytest.approx(0.01, rel=0.03)
 
 
 @pytest.mark.parametrize(
@@ -49,8 +22,6 @@ def test_one_kind_of_error_does_not_change_the_draws_of_another():
         (lambda: Source(angular_radius=1.0), "angular radius is 57.3°"),
         (lambda: Source(stability=np.nan), "stability"),
         (lambda: Source(polarisation=(0.9, 0.9, 0.0)), "together at most 1"),
-        (lambda: AngleErrors(sample=-1.0), r"sample is -57\.3°, it must be within 0° … 5\.7°"),
-        (lambda: AngleErrors(camera=0.5), "camera is 28.6"),
     ],
 )
 def test_numbers_out_of_range_are_refused(make, message):

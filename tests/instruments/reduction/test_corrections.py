@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from pbrdf.errors import DataError
-from pbrdf.instruments.frames.frames import ArrayFrames, MosaicFrames
+from pbrdf.instruments.frames.frames import ArrayFrames
+from pbrdf.instruments.frames.mosaic import MosaicFrames
 from pbrdf.instruments.polarimeter.detector import Detector
 from pbrdf.instruments.polarimeter.instrument import Instrument
 from pbrdf.instruments.polarimeter.polarimeter import division_of_focal_plane, rotating_polarizer

@@ -8,14 +8,13 @@ import pytest
 from pbrdf.errors import DataError
 from pbrdf.instruments.polarimeter.detector import Detector
 from pbrdf.instruments.polarimeter.polarimeter import (
-    division_of_focal_plane,
     lcvr,
     measured,
     rotating_polarizer,
 )
 from pbrdf.instruments.polarimeter.retardance_sets import retardance_set
 from pbrdf.instruments.polarimeter.stokes_solution import solve_stokes
-from pbrdf.instruments.reduction.stokes_image import PixelFlag, flag_pixels, reduce_frames, split_mosaic
+from pbrdf.instruments.reduction.stokes_image import PixelFlag, flag_pixels, reduce_frames
 
 SIX = lcvr(retardance_set("six_states"))
 FOUR = lcvr(retardance_set("tetrahedron"))
@@ -149,18 +148,6 @@ def test_a_map_is_reduced_with_the_vectors_of_each_place():
     np.testing.assert_array_equal(part.stokes, whole.stokes[:, 2:5])
 
 
-def test_mosaic_cells():
-    """[[90, 45], [135, 0]]: the number at the lower right of each cell is that of 0°."""
-    polarimeter = division_of_focal_plane(np.deg2rad([[90, 45], [135, 0]]))
-    picture = np.arange(24).reshape(4, 6)
-    split = split_mosaic(picture, polarimeter)
-    assert split.shape == (4, 2, 3)
-    np.testing.assert_array_equal(split[polarimeter.states.index("0")], [[7, 9, 11], [19, 21, 23]])
-    np.testing.assert_array_equal(split[polarimeter.states.index("45")], [[1, 3, 5], [13, 15, 17]])
-    stack = split_mosaic(np.stack([picture, picture + 100]), polarimeter)
-    np.testing.assert_array_equal(stack, [split, split + 100])
-
-
 def test_errors():
     with pytest.raises(DataError, match="5 frames for the 6 states"):
         reduce_frames(np.ones((5, 3)), SIX, DETECTOR)
@@ -170,10 +157,6 @@ def test_errors():
         reduce_frames(np.full((6, 3), 100.0), SIX, DETECTOR, black=np.ones(4))
     with pytest.raises(DataError, match="cannot be placed"):
         reduce_frames(np.full((6, 3), 100.0), measured(np.ones((2, 2, 6, 4))), DETECTOR)
-    with pytest.raises(DataError, match="no mosaic"):
-        split_mosaic(np.ones((4, 4)), SIX)
-    with pytest.raises(DataError, match="whole 2 × 2 cells"):
-        split_mosaic(np.ones((4, 5)), division_of_focal_plane([[0.0, 1.0], [2.0, 3.0]]))
     # a flat field may be anything where the pixel is dead
     image = reduce_frames(
         np.full((6, 3), 100.0), SIX, DETECTOR, flat=[1.0, 0.0, np.nan], dead=[False, True, True]

@@ -11,16 +11,17 @@ import pbrdf
 from pbrdf.data.paints import PAINTS, load_paint
 from pbrdf.errors import DataError
 from pbrdf.instruments.frames.frame_files import open_frames
+from pbrdf.instruments.goniometer.angle_errors import AngleErrors
 from pbrdf.instruments.goniometer.angle_table import read_angles
 from pbrdf.instruments.goniometer.protocols import Protocol
-from pbrdf.instruments.goniometer.source import AngleErrors, Source
+from pbrdf.instruments.goniometer.source import Source
 from pbrdf.instruments.polarimeter.detector import Detector
 from pbrdf.instruments.polarimeter.instrument_files import load_instrument
 from pbrdf.instruments.polarimeter.polarimeter import lcvr
 from pbrdf.instruments.polarimeter.presets import preset
 from pbrdf.instruments.polarimeter.retardance_sets import retardance_set
+from pbrdf.instruments.reduction.goniometric_datasets import goniometric_datasets
 from pbrdf.instruments.reduction.region_files import read_regions
-from pbrdf.instruments.reduction.series import goniometric_datasets
 from pbrdf.instruments.reduction.stokes_image import reduce_frames
 from pbrdf.instruments.virtual.experiment import VirtualExperiment
 from pbrdf.instruments.virtual.measurement_folder import write_measurement

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from pbrdf.instruments.calibration.analyzer_calibration import standard_inputs
 from pbrdf.instruments.calibration.input_table import InputTable
 from pbrdf.instruments.calibration.instrument_calibration import calibrate_instrument
-from pbrdf.instruments.calibration.known_inputs import standard_inputs
 from pbrdf.instruments.frames.frames import ArrayFrames
 from pbrdf.instruments.polarimeter.detector import Detector
 from pbrdf.instruments.polarimeter.instrument import Instrument

@@ -5,6 +5,7 @@ import pytest
 
 from pbrdf.instruments.frames.frames import ArrayFrames
 from pbrdf.instruments.reduction.stokes_image import StokesImage
+from pbrdf.instruments.reduction.streaming import Block
 from pbrdf.report.reduction import gallery
 from pbrdf.report.reduction.gallery import Gallery, safe_name
 from pbrdf.report.reduction.quicklook import overview_figure
@@ -19,11 +20,11 @@ def image(level, rows=6, columns=5):
 
 def drawn(tmp_path, names):
     frames = ArrayFrames(np.zeros((len(names), 4, 6, 5), np.uint16), names)
-    made = Gallery(frames, tmp_path, "run", {})
-    for series in range(len(names)):
-        for first in (0, 3):
-            made.add(series, made.sums(series, first, image(100.0 + series, rows=3)))
-    made.close()
+    with Gallery(frames, tmp_path, "run", {}) as made:
+        for series in range(len(names)):
+            for first in (0, 3):
+                block = Block(series, first, first + 3, image(100.0 + series, rows=3))
+                made.add(block, made.prepare(block))
     assert sorted(made.files) == sorted(path.name for path in tmp_path.iterdir())
     return made.files
 
@@ -52,6 +53,18 @@ def test_one_series_needs_no_overview(tmp_path):
 
 def test_names_that_a_file_cannot_have(tmp_path):
     assert drawn(tmp_path, ("a/b", "a:b")) == ["overview.png", "picture_a_b.png", "picture_a_b_2.png"]
+
+
+def test_an_error_leaves_no_pictures(tmp_path):
+    frames = ArrayFrames(np.zeros((2, 4, 6, 5), np.uint16), ("a", "b"))
+    (tmp_path / "other.png").touch()
+    with pytest.raises(RuntimeError), Gallery(frames, tmp_path, "run", {}) as made:
+        for series in range(2):
+            block = Block(series, 0, 6, image(100.0))
+            made.add(block, made.prepare(block))
+        assert (tmp_path / "picture_a.png").exists()
+        raise RuntimeError
+    assert [path.name for path in tmp_path.iterdir()] == ["other.png"]
 
 
 @pytest.mark.parametrize(

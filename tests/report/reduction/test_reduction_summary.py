@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from pbrdf.instruments.reduction.regions import RegionAverage
+from pbrdf.instruments.reduction.region_averages import RegionAverage
 from pbrdf.report.reduction.summary import print_averages, write_averages
 
 

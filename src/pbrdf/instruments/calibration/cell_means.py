@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pbrdf.errors import DataError
+from pbrdf.instruments.frames.frames import Frames
 from pbrdf.instruments.polarimeter.detector import Detector
+from pbrdf.instruments.polarimeter.instrument import Instrument
+from pbrdf.instruments.reduction.corrections import Corrections, require_range
+from pbrdf.instruments.reduction.regions import Region, require_inside
 from pbrdf.instruments.reduction.stokes_image import PixelFlag, count_flags, flag_pixels
 
-__all__ = ["Readings", "read_inputs", "read_inputs_one_by_one"]
+__all__ = ["CellMeans", "cell_means", "cell_means_of_frames"]
 
 
 @dataclass(frozen=True, eq=False)
-class Readings:
-    """What the instrument read at K known inputs.
+class CellMeans:
+    """What the instrument read at K known inputs, on the mean over cells of its field of view.
 
     Attributes
     ----------
@@ -46,7 +50,7 @@ class Readings:
         return count_flags(self.flags[self.used])
 
 
-def read_inputs(
+def cell_means(
     frames: ArrayLike,
     detector: Detector,
     *,
@@ -55,7 +59,7 @@ def read_inputs(
     dark_level: float = 0.0,
     black: ArrayLike | None = None,
     flat: ArrayLike | None = None,
-) -> Readings:
+) -> CellMeans:
     """Mean intensities of calibration frames over cells of the field of view, bad pixels left out.
 
     Parameters
@@ -80,7 +84,7 @@ def read_inputs(
         raise DataError(
             f"calibration frames have the shape {frames.shape}: give (states, inputs, rows, columns)"
         )
-    return read_inputs_one_by_one(
+    return _one_by_one(
         lambda k: frames[:, k],
         np.ones(frames.shape[1], dtype=bool),
         detector,
@@ -92,38 +96,87 @@ def read_inputs(
     )
 
 
-def read_inputs_one_by_one(
-    read: Callable[[int], np.ndarray],
+def cell_means_of_frames(
+    frames: Frames,
+    instrument: Instrument,
     lit: np.ndarray,
-    detector: Detector,
     *,
     cells: tuple[int, int] | None = (1, 1),
-    dead: ArrayLike | None = None,
+    regions: Sequence[Region] = (),
     dark_level: float = 0.0,
-    black: ArrayLike | None = None,
-    flat: ArrayLike | None = None,
-    used: np.ndarray | None = None,
     progress: Callable[[int, int], None] | None = None,
-) -> Readings:
-    """As :func:`read_inputs` for frames that are not all in memory: each input is read twice.
+) -> CellMeans:
+    """As :func:`cell_means` for frames not all in memory, corrected as the instrument's table ``[frames]`` says.
 
     Parameters
     ----------
-    read
-        Gives the raw digital numbers of an input by its number, shape (N, rows, columns).
+    frames, instrument
+        What was read, and with what.
     lit
-        Which of the K inputs are light; at the others no pixel counts as dark.
-    detector, cells, dead, dark_level, black, flat
-        See :func:`read_inputs`.
-    used
-        Pixels to be used, bool, shape (rows, columns); all by default.
+        Which of the series are light, not darkness, shape (K,).
+    cells
+        See :func:`cell_means`.
+    regions
+        Parts of the picture that were lit evenly; all of it by default.
+    dark_level
+        See :func:`pbrdf.instruments.reduction.stokes_image.flag_pixels`.
     progress
         Called with the number of finished readings and of all.
 
     Raises
     ------
     DataError
-        If shapes do not fit, or no pixel is good.
+        If frames, instrument and regions do not fit each other, or no pixel is good.
+    """
+    size = instrument.polarimeter.size
+    if frames.states != size:
+        raise DataError(
+            f"{frames.states} frames a series for the {size} states of {instrument.polarimeter.name}"
+        )
+    require_inside({f"{k + 1}": region for k, region in enumerate(regions)}, frames.rows, frames.columns)
+    used = None
+    if regions:
+        used = np.any([region.mask(0, frames.rows, frames.columns) for region in regions], axis=0)
+    pixels = Corrections.of(instrument, frames).pixels(instrument, slice(0, frames.rows))
+
+    def read(k: int) -> np.ndarray:
+        raw = frames.read(k, 0, frames.rows)
+        try:
+            require_range(raw, instrument)
+        except DataError as error:
+            raise DataError(f"series {frames.names[k]!r}: {error}") from None
+        return raw
+
+    return _one_by_one(
+        read,
+        lit,
+        instrument.detector,
+        cells=cells,
+        dead=pixels.dead,
+        dark_level=dark_level,
+        black=pixels.black,
+        flat=pixels.flat,
+        used=used,
+        progress=progress,
+    )
+
+
+def _one_by_one(
+    read: Callable[[int], np.ndarray],
+    lit: np.ndarray,
+    detector: Detector,
+    *,
+    cells: tuple[int, int] | None,
+    dead: ArrayLike | None,
+    dark_level: float,
+    black: ArrayLike | None,
+    flat: ArrayLike | None,
+    used: np.ndarray | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> CellMeans:
+    """The means from frames that `read` gives by the number of the input, shape (N, rows, columns); each is read twice.
+
+    At inputs that are not lit no pixel counts as dark; pixels that are not `used` are left out.
     """
     inputs = len(lit)
     first = read(0)
@@ -173,4 +226,4 @@ def read_inputs_one_by_one(
             progress(inputs + k + 1, 2 * inputs)
     if cells == (1, 1):
         intensities, variance, pixels = intensities[..., 0, 0], variance[..., 0, 0], pixels[0, 0]
-    return Readings(intensities, variance, np.asarray(pixels), flags, wanted)
+    return CellMeans(intensities, variance, np.asarray(pixels), flags, wanted)

@@ -9,25 +9,23 @@ from typing import Any, Literal
 import numpy as np
 
 from pbrdf.errors import DataError
-from pbrdf.instruments.calibration.cell_means import read_inputs_one_by_one
-from pbrdf.instruments.calibration.input_table import InputTable
-from pbrdf.instruments.calibration.known_inputs import (
+from pbrdf.instruments.calibration.analyzer_calibration import (
     Accuracy,
     Calibration,
-    Readings,
     accuracy_of,
     calibrate,
     reduced_inputs,
 )
+from pbrdf.instruments.calibration.cell_means import CellMeans, cell_means_of_frames
+from pbrdf.instruments.calibration.input_table import InputTable
 from pbrdf.instruments.calibration.settings_calibration import ModelCalibration, calibrate_model
 from pbrdf.instruments.frames.frames import Frames
 from pbrdf.instruments.polarimeter.instrument import Instrument
 from pbrdf.instruments.polarimeter.polarimeter import Polarimeter
 from pbrdf.instruments.polarimeter.stokes_solution import solve_stokes
-from pbrdf.instruments.reduction.corrections import Corrections, require_range
-from pbrdf.instruments.reduction.regions import Region, require_inside
+from pbrdf.instruments.reduction.regions import Region
 
-__all__ = ["InstrumentCalibration", "calibrate_instrument", "read_frames"]
+__all__ = ["InstrumentCalibration", "calibrate_instrument"]
 
 #: A residual of more than this share of the mean reading is no error of an instrument.
 _CONTRADICTION = 0.1
@@ -66,7 +64,7 @@ class InstrumentCalibration:
     nominal: Polarimeter
     calibration: Calibration | ModelCalibration
     inputs: InputTable
-    readings: Readings
+    readings: CellMeans
     nominal_found: np.ndarray
     nominal_accuracy: Accuracy | None
     level: float
@@ -130,71 +128,6 @@ class InstrumentCalibration:
         return np.array([np.sqrt(np.mean(apart[..., part] ** 2)) for part in ([0], [1, 2], [3])])
 
 
-def read_frames(
-    frames: Frames,
-    instrument: Instrument,
-    lit: np.ndarray,
-    *,
-    cells: tuple[int, int] | None = (1, 1),
-    regions: Sequence[Region] = (),
-    dark_level: float = 0.0,
-    progress: Callable[[int, int], None] | None = None,
-) -> Readings:
-    """Mean intensities of frames over cells of the field, with the instrument's dark frame, flat field and dead pixels.
-
-    Parameters
-    ----------
-    frames, instrument
-        What was read, and with what.
-    lit
-        Which of the series are light, not darkness, shape (K,).
-    cells
-        As in :func:`pbrdf.instruments.calibration.known_inputs.read_inputs`.
-    regions
-        Parts of the picture that were lit evenly; all of it by default.
-    dark_level
-        See :func:`pbrdf.instruments.reduction.stokes_image.flag_pixels`.
-    progress
-        Called with the number of finished readings and of all.
-
-    Raises
-    ------
-    DataError
-        If frames, instrument and regions do not fit each other, or no pixel is good.
-    """
-    size = instrument.polarimeter.size
-    if frames.states != size:
-        raise DataError(
-            f"{frames.states} frames a series for the {size} states of {instrument.polarimeter.name}"
-        )
-    require_inside({f"{k + 1}": region for k, region in enumerate(regions)}, frames.rows, frames.columns)
-    used = None
-    if regions:
-        used = np.any([region.mask(0, frames.rows, frames.columns) for region in regions], axis=0)
-    pixels = Corrections.of(instrument, frames).pixels(instrument, slice(0, frames.rows))
-
-    def read(k: int) -> np.ndarray:
-        raw = frames.read(k, 0, frames.rows)
-        try:
-            require_range(raw, instrument)
-        except DataError as error:
-            raise DataError(f"series {frames.names[k]!r}: {error}") from None
-        return raw
-
-    return read_inputs_one_by_one(
-        read,
-        lit,
-        instrument.detector,
-        cells=cells,
-        dead=pixels.dead,
-        dark_level=dark_level,
-        black=pixels.black,
-        flat=pixels.flat,
-        used=used,
-        progress=progress,
-    )
-
-
 def calibrate_instrument(
     frames: Frames,
     instrument: Instrument,
@@ -231,7 +164,7 @@ def calibrate_instrument(
     gain, fixed
         Of such a fit.
     regions, dark_level, progress
-        See :func:`read_frames`.
+        See :func:`pbrdf.instruments.calibration.cell_means.cell_means_of_frames`.
 
     Raises
     ------
@@ -257,7 +190,7 @@ def calibrate_instrument(
     shape = (frames.rows, frames.columns) if cells is None else cells
     _require_memory(shape, polarimeter.size, len(table.names))
     instrument = _with_flat_transmittance(instrument)
-    readings = read_frames(
+    readings = cell_means_of_frames(
         frames,
         instrument,
         table.stokes[0] > 0.0,

@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pbrdf.errors import DataError, FitError
-from pbrdf.instruments.calibration.known_inputs import Accuracy, accuracy_of, reduced_inputs
-from pbrdf.instruments.calibration.settings import Settings
+from pbrdf.instruments.calibration.analyzer_calibration import Accuracy, accuracy_of, reduced_inputs
+from pbrdf.instruments.calibration.parametric_polarimeter import ParametricPolarimeter
 from pbrdf.instruments.polarimeter.polarimeter import Polarimeter
 
 __all__ = ["ModelCalibration", "calibrate_model"]
@@ -170,7 +170,9 @@ def calibrate_model(
     if len(set(held_out)) != S.shape[1] - len(kept):
         raise DataError(f"an input held out is not one of 0 … {S.shape[1] - 1}")
     train, sigma = S[:, kept], np.sqrt(spread[:, kept])
-    settings = Settings(nominal, gain, shared, start_gain=_start_gain(nominal, read[:, kept], train))
+    settings = ParametricPolarimeter(
+        nominal, gain, shared, start_gain=_start_gain(nominal, read[:, kept], train)
+    )
     reasons = settings.reasons(fixed)
 
     def residuals(x: np.ndarray) -> np.ndarray:
@@ -266,7 +268,7 @@ def _start_gain(nominal: Polarimeter, read: np.ndarray, S: np.ndarray) -> float:
     return found
 
 
-def _dependent(J: np.ndarray, settings: Settings, known: dict[str, str]) -> dict[str, str]:
+def _dependent(J: np.ndarray, settings: ParametricPolarimeter, known: dict[str, str]) -> dict[str, str]:
     """Settings that the readings do not tell from those before them in the order of preference."""
     basis: list[np.ndarray] = []
     found = {}

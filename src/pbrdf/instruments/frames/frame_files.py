@@ -18,7 +18,9 @@ import numpy as np
 
 from pbrdf.errors import DataError
 from pbrdf.instruments.frames.frame_grids import GRID_SUFFIXES, open_grid
-from pbrdf.instruments.frames.frames import FrameLayout, Frames, MosaicFrames, named, require_raw
+from pbrdf.instruments.frames.frame_layout import FrameLayout
+from pbrdf.instruments.frames.frames import Frames, named, require_raw
+from pbrdf.instruments.frames.mosaic import MosaicFrames
 from pbrdf.instruments.frames.pictures import SUFFIXES, PictureFile, open_pictures
 from pbrdf.instruments.polarimeter.instrument import Instrument
 

@@ -1,1 +1,1 @@
-"""Geometries: rays, protocols of a goniometer, the light source, tables of angles."""
+"""Geometries: rays, protocols of a goniometer and errors of its angles, the light source, tables of angles."""

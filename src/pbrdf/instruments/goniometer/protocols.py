@@ -19,8 +19,7 @@ from numpy.typing import ArrayLike
 
 from pbrdf.errors import DataError
 from pbrdf.instruments.goniometer.angle_table import AngleTable
-from pbrdf.instruments.goniometer.rays import angles_of, between
-from pbrdf.instruments.goniometer.rays import rays as ray_vectors
+from pbrdf.instruments.goniometer.rays import angles_of, between, ray_vectors
 
 __all__ = ["BISTATIC", "LABORATORIES", "SAMPLE_ANGLES", "Protocol", "crowded_sample_angles"]
 
@@ -292,7 +291,7 @@ class Protocol:
         """The same for the incident ray and the axes of the source, which is held as the camera is; shape (G,)."""
         return self._reference("omega_r", "omega_i", ("p_i", "s_i"))
 
-    def _reference(self, other: str, own: str, frame: tuple[str, str]) -> np.ndarray:
+    def _reference(self, other: str, own: str, axes: tuple[str, str]) -> np.ndarray:
         if self.laboratory == "meridian":
             return np.zeros(len(self))
         rays = ray_vectors(self.theta_i, self.theta_r, self.phi)
@@ -300,10 +299,10 @@ class Protocol:
             along = np.einsum("gk,gk->g", rays[other], rays[own])
             x = rays[other] - along[:, None] * rays[own]
             in_line = np.linalg.norm(x, axis=1) < 1e-9  # source and camera span no plane then
-            x[in_line] = rays[frame[0]][in_line]
+            x[in_line] = rays[axes[0]][in_line]
         else:
             x = np.cross([0.0, 1.0, 0.0], rays[own])
-        angle = np.arctan2(*(np.einsum("gk,gk->g", x, rays[name]) for name in reversed(frame)))
+        angle = np.arctan2(*(np.einsum("gk,gk->g", x, rays[name]) for name in reversed(axes)))
         # rounding must not tell −90° from 90°, nor 180° from 0°
         angle = np.mod(angle, np.pi)
         return np.where(angle > 0.5 * np.pi + 1e-12, angle - np.pi, angle)

@@ -10,10 +10,10 @@ import numpy as np
 from pbrdf.backend import get_backend
 from pbrdf.optics.geometry import geometry_from_angles
 
-__all__ = ["angles_of", "between", "rays"]
+__all__ = ["angles_of", "between", "ray_vectors"]
 
 
-def rays(theta_i: np.ndarray, theta_r: np.ndarray, phi: np.ndarray) -> dict[str, np.ndarray]:
+def ray_vectors(theta_i: np.ndarray, theta_r: np.ndarray, phi: np.ndarray) -> dict[str, np.ndarray]:
     """The vectors of :class:`~pbrdf.optics.geometry.Geometry` by name, shape (G, 3) each."""
     backend = get_backend()
     geometry = geometry_from_angles(*(backend.upload(backend.Float, a) for a in (theta_i, theta_r, phi)))

@@ -1,24 +1,22 @@
-"""What the light source and the goniometer's mechanics add to a measurement.
+"""The light source of a goniometer: the port of an integrating sphere.
 
-The source is the port of an integrating sphere: a uniform disc of some angular radius seen from the sample, steady
-from one reading to the next up to its stability, and nearly unpolarised. The mechanics set angles with an error of
-their own.
+It is a uniform disc of some angular radius seen from the sample, steady from one reading to the next up to its
+stability, and nearly unpolarised.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
 from pbrdf.errors import DataError
-from pbrdf.instruments.goniometer.protocols import Protocol
 
-__all__ = ["AngleErrors", "Source"]
+__all__ = ["Source"]
 
-#: Largest angular radius of a source, and largest standard deviation of an angle, radians.
-_WIDEST, _LARGEST_ERROR = 0.5, 0.1
+#: Largest angular radius, radians.
+_WIDEST = 0.5
 
 
 @dataclass(frozen=True)
@@ -34,7 +32,7 @@ class Source:
         than 0.001.
     polarisation
         Residual polarisation Q/I, U/I, V/I in the axes of the source, which is held as the camera is (see
-        :attr:`Protocol.source_reference_angle`); Q > 0 along its x axis.
+        :attr:`.Protocol.source_reference_angle`); Q > 0 along its x axis.
     """
 
     angular_radius: float = 0.0
@@ -60,55 +58,6 @@ class Source:
         """Stokes vector of unit irradiance in the axes of the source, shape (4,)."""
         return np.array([1.0, *self.polarisation])
 
-    def readings(self, count: int, rng: np.random.Generator) -> np.ndarray:
-        """Radiance at so many readings, 1 on average; shape (count,)."""
+    def radiances(self, count: int, rng: np.random.Generator) -> np.ndarray:
+        """Radiance at so many readings, relative to its mean; shape (count,)."""
         return 1.0 + self.stability * rng.standard_normal(count)
-
-
-@dataclass(frozen=True)
-class AngleErrors:
-    """Errors of the goniometer's angles, normal, radians.
-
-    Attributes
-    ----------
-    sample
-        Standard deviation of the sample angle at each geometry.
-    camera
-        Standard deviation of the camera's position, drawn once for each group: it stays where it is while the sample
-        turns.
-    zero
-        Standard deviation of the zero of the sample angle, drawn once for each group, as the sample is mounted anew.
-    tilt
-        Standard deviation of the tilt of the sample out of the plane of incidence at each geometry.
-    """
-
-    sample: float = 0.0
-    camera: float = 0.0
-    zero: float = 0.0
-    tilt: float = 0.0
-
-    def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if not (math.isfinite(value) and 0.0 <= value <= _LARGEST_ERROR):
-                raise DataError(
-                    f"angle errors: that of the {field.name} is {math.degrees(value):.4g}°, it must be within "
-                    f"0° … {math.degrees(_LARGEST_ERROR):.1f}°"
-                )
-
-    def apply(self, protocol: Protocol, rng: np.random.Generator) -> Protocol:
-        """The geometries that there really are when those of a protocol are set.
-
-        Raises
-        ------
-        DataError
-            If an error puts a ray below the horizon.
-        """
-        labels, member = np.unique(protocol.group, return_inverse=True)
-        # drawn whatever the sizes are, so that one error can be changed and the others stay
-        own = rng.standard_normal(len(protocol))
-        camera, zero = rng.standard_normal((2, len(labels)))
-        tilt = rng.standard_normal(len(protocol))
-        return protocol.displaced(
-            self.sample * own + self.zero * zero[member], self.camera * camera[member], self.tilt * tilt
-        )

@@ -134,7 +134,7 @@ def expected_covariance(
     instrument
         What will measure; of a map of analyser vectors the mean counts.
     stokes
-        Radiance in the (p, s) frame of the surface, in digital numbers at unit exposure, shape (..., 4).
+        Radiance in the axes (p, s) of the surface, in digital numbers at unit exposure, shape (..., 4).
     reference_angle
         From the p direction to the instrument's x axis, radians, shape (...) or a number.
     pixels
@@ -145,7 +145,7 @@ def expected_covariance(
     Returns
     -------
     ndarray
-        In the (p, s) frame and the square of the unit of `stokes`, shape (..., 4, 4); NaN for components that the
+        In the axes (p, s) and the square of the unit of `stokes`, shape (..., 4, 4); NaN for components that the
         instrument does not see.
 
     Raises

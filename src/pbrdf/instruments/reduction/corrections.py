@@ -16,10 +16,12 @@ import numpy as np
 
 from pbrdf.errors import DataError
 from pbrdf.instruments.frames.frame_files import open_picture
-from pbrdf.instruments.frames.frames import FrameLayout, Frames, require_raw
+from pbrdf.instruments.frames.frame_layout import FrameLayout
+from pbrdf.instruments.frames.frames import Frames, require_raw
+from pbrdf.instruments.frames.mosaic import split_mosaic
 from pbrdf.instruments.polarimeter.instrument import Instrument
 from pbrdf.instruments.polarimeter.stokes_solution import solve_stokes
-from pbrdf.instruments.reduction.stokes_image import StokesImage, reduce_frames, split_mosaic
+from pbrdf.instruments.reduction.stokes_image import StokesImage, reduce_frames
 
 __all__ = ["Corrections", "PixelLevels", "reduce_rows", "require_range"]
 

@@ -13,7 +13,7 @@ from pbrdf.instruments.polarimeter.detector import Detector
 from pbrdf.instruments.polarimeter.polarimeter import Polarimeter
 from pbrdf.instruments.polarimeter.stokes_solution import BLOCK, blank, row_space, solve_block
 
-__all__ = ["PixelFlag", "StokesImage", "count_flags", "flag_pixels", "reduce_frames", "split_mosaic"]
+__all__ = ["BAD_FLAGS", "PixelFlag", "StokesImage", "count_flags", "flag_pixels", "reduce_frames"]
 
 
 class PixelFlag(IntFlag):
@@ -23,6 +23,10 @@ class PixelFlag(IntFlag):
     SATURATED = 1
     DEAD = 2
     DARK = 4
+
+
+#: The flags of pixels that are left out.
+BAD_FLAGS = (PixelFlag.SATURATED, PixelFlag.DEAD, PixelFlag.DARK)
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,39 +57,9 @@ class StokesImage:
 def count_flags(flags: np.ndarray) -> dict[str, int]:
     """How many pixels are good, and how many carry each flag; a pixel may carry several."""
     found = {"good": int((flags == 0).sum())}
-    for flag in (PixelFlag.SATURATED, PixelFlag.DEAD, PixelFlag.DARK):
+    for flag in BAD_FLAGS:
         found[str(flag.name).lower()] = int((flags & flag != 0).sum())
     return found
-
-
-def split_mosaic(frame: ArrayLike, polarimeter: Polarimeter) -> np.ndarray:
-    """Intensities of a division of focal plane, one for each state in each cell of the mosaic.
-
-    Parameters
-    ----------
-    frame
-        Raw picture, shape (..., rows, columns), both a multiple of the cell's.
-
-    Returns
-    -------
-    ndarray
-        Shape (..., N, rows/cell rows, columns/cell columns). Cells are not interpolated: each keeps its own noise.
-
-    Raises
-    ------
-    DataError
-        If the polarimeter has no mosaic or the picture is not made of whole cells.
-    """
-    frame = np.asarray(frame)
-    if polarimeter.mosaic is None:
-        raise DataError(f"{polarimeter.name} has no mosaic")
-    tall, wide = polarimeter.mosaic.shape
-    if frame.ndim < 2 or frame.shape[-2] % tall or frame.shape[-1] % wide:
-        raise DataError(
-            f"a picture of {' × '.join(map(str, frame.shape[-2:]))} pixels is not made of whole {tall} × {wide} cells"
-        )
-    places = [np.argwhere(polarimeter.mosaic == state)[0] for state in range(polarimeter.size)]
-    return np.stack([frame[..., y::tall, x::wide] for y, x in places], axis=-3)
 
 
 def flag_pixels(
@@ -168,7 +142,8 @@ def reduce_frames(
     Parameters
     ----------
     frames
-        Raw digital numbers, shape (N, ...): one frame a state (for a mosaic: after :func:`split_mosaic`).
+        Raw digital numbers, shape (N, ...): one frame a state (for a mosaic: after
+        :func:`pbrdf.instruments.frames.mosaic.split_mosaic`).
     polarimeter, detector
         What took them.
     dead, dark_level

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import TypeVar
@@ -61,7 +61,7 @@ def reduced_blocks(
     weighted: bool = True,
     max_memory: int = DEFAULT_MEMORY,
     progress: Callable[[int, int], None] | None = None,
-) -> Iterator[T]:
+) -> Generator[T]:
     """Reduce all series, one block of rows after another, in several threads.
 
     Parameters

@@ -17,14 +17,15 @@ import numpy as np
 
 from pbrdf.errors import DataError
 from pbrdf.instruments.frames.frames import ArrayFrames
+from pbrdf.instruments.goniometer.angle_errors import AngleErrors
 from pbrdf.instruments.goniometer.angle_table import AngleTable
 from pbrdf.instruments.goniometer.protocols import Protocol
-from pbrdf.instruments.goniometer.source import AngleErrors, Source
+from pbrdf.instruments.goniometer.source import Source
 from pbrdf.instruments.polarimeter.expected_noise import FILL, automatic_exposure
 from pbrdf.instruments.polarimeter.instrument import Instrument
 from pbrdf.instruments.polarimeter.polarimeter import Polarimeter
+from pbrdf.instruments.reduction.goniometric_datasets import goniometric_datasets
 from pbrdf.instruments.reduction.regions import Rectangle
-from pbrdf.instruments.reduction.series import goniometric_datasets
 from pbrdf.instruments.virtual.miscalibration import miscalibrated
 from pbrdf.models.base import Model
 from pbrdf.models.extended_source import stokes_under_disc
@@ -128,9 +129,9 @@ class VirtualExperiment:
         angles, steadiness, calibration, noise = (np.random.default_rng(s) for s in streams)
         source = self.source or Source(stability=self.instrument.stability)
         true = self.angle_errors.apply(self.protocol, angles)
-        readings = source.readings(len(true), steadiness)
+        steady = source.radiances(len(true), steadiness)
         radiance = {
-            name: self._radiance(model, true, source) * readings[:, None] for name, model in samples.items()
+            name: self._radiance(model, true, source) * steady[:, None] for name, model in samples.items()
         }
         regions = self._regions(list(samples))
         rows, columns = self.patch + 2 * self.margin, int(max(r.x1 for r in regions.values())) + self.margin
@@ -172,7 +173,7 @@ class VirtualExperiment:
         )
 
     def _radiance(self, model: Model, true: Protocol, source: Source) -> np.ndarray:
-        """Stokes vectors in the (p, s) frame for unit irradiance across the rays, shape (G, 4)."""
+        """Stokes vectors in the axes (p, s) for unit irradiance across the rays, shape (G, 4)."""
         incident = rotate_frame(-true.source_reference_angle) @ source.stokes
         stokes = stokes_under_disc(
             model, true.theta_i, true.theta_r, true.phi, source.angular_radius, incident
@@ -235,7 +236,7 @@ class Measurement:
         Raises
         ------
         DataError
-            As :func:`~pbrdf.instruments.reduction.series.goniometric_datasets`.
+            As :func:`~pbrdf.instruments.reduction.goniometric_datasets.goniometric_datasets`.
         """
 
         found = goniometric_datasets(

@@ -7,11 +7,10 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 from pbrdf.data.formats.storage import atomic_folder
 from pbrdf.data.readers import write
 from pbrdf.errors import DataError
+from pbrdf.instruments.frames.mosaic import weave_mosaic
 from pbrdf.instruments.goniometer.angle_table import write_angles
 from pbrdf.instruments.polarimeter.instrument_files import save_instrument
 from pbrdf.instruments.virtual.experiment import Measurement
@@ -98,18 +97,8 @@ def _write_frames(measurement: Measurement, folder: Path) -> None:
     polarimeter = measurement.experiment.instrument.polarimeter
     for series, frames in zip(measurement.frames.names, measurement.frames.array, strict=True):
         if polarimeter.mosaic is not None:
-            pictures = {series: _woven(frames, polarimeter.mosaic)}
+            pictures = {series: weave_mosaic(frames, polarimeter)}
         else:
             pictures = {f"{series}_{s}": f for s, f in zip(polarimeter.states, frames, strict=True)}
         for name, picture in pictures.items():
             Image.fromarray(picture).save(folder / f"{name}.png")
-
-
-def _woven(frames: np.ndarray, mosaic: np.ndarray) -> np.ndarray:
-    """One picture of a mosaic from the frames of its states."""
-    tall, wide = mosaic.shape
-    picture = np.empty((frames.shape[1] * tall, frames.shape[2] * wide), dtype=frames.dtype)
-    for y in range(tall):
-        for x in range(wide):
-            picture[y::tall, x::wide] = frames[mosaic[y, x]]
-    return picture

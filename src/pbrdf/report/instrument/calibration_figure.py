@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pbrdf.instruments.calibration.known_inputs import input_errors
+from pbrdf.instruments.calibration.analyzer_calibration import input_errors
 from pbrdf.instruments.polarimeter.merit import condition_number
 from pbrdf.report.instrument.calibration_summary import angle_errors
 from pbrdf.report.numbers import per_cent

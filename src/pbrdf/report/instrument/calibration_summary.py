@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pbrdf.data.formats.storage import atomic_target
-from pbrdf.instruments.calibration.known_inputs import Calibration
+from pbrdf.instruments.calibration.analyzer_calibration import Calibration
 from pbrdf.instruments.calibration.settings_calibration import ModelCalibration
 from pbrdf.optics.stokes import STOKES, aolp, docp, dolp
 from pbrdf.report.instrument.polarimeter_summary import merit_table, vector_table

@@ -1,26 +1,25 @@
-"""The folder that a reduction leaves behind, written while the frames are read once."""
+"""The folder that a reduction leaves behind."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
-
-import numpy as np
+from typing import Any
 
 from pbrdf.data.readers import write
 from pbrdf.errors import DataError
 from pbrdf.instruments.frames.frames import Frames
 from pbrdf.instruments.goniometer.angle_table import AngleTable
 from pbrdf.instruments.polarimeter.instrument import Instrument
-from pbrdf.instruments.reduction.regions import Rectangle, Region, RegionAverage
-from pbrdf.instruments.reduction.series import RegionCollector, datasets_of_averages, require_same_series
-from pbrdf.instruments.reduction.stokes_maps import MapWriter, pixel_maps
-from pbrdf.instruments.reduction.streaming import DEFAULT_MEMORY, Block, reduced_blocks
+from pbrdf.instruments.reduction.goniometric_datasets import DatasetCollector
+from pbrdf.instruments.reduction.map_files import MapWriter
+from pbrdf.instruments.reduction.reduce import Sink, reduce
+from pbrdf.instruments.reduction.region_averages import RegionAverage, RegionCollector
+from pbrdf.instruments.reduction.regions import Rectangle, Region
+from pbrdf.instruments.reduction.streaming import DEFAULT_MEMORY
 from pbrdf.report.fit.folder import complete_folder
 from pbrdf.report.reduction.gallery import Gallery, safe_name
-from pbrdf.report.reduction.picture_sums import BlockSums
 from pbrdf.report.reduction.summary import write_averages
 from pbrdf.version import __version__
 
@@ -106,56 +105,42 @@ def write_reduction(
     DataError
         If the input does not fit together or the folder cannot be written.
     """
-    regions = {WHOLE_PICTURE: Rectangle(0, frames.columns, 0, frames.rows), **wanted.regions}
-    collector = RegionCollector(regions, frames)
+    whole = RegionCollector({WHOLE_PICTURE: Rectangle(0, frames.columns, 0, frames.rows)}, frames, instrument)
+    parts = (
+        RegionCollector(wanted.regions, frames, instrument)
+        if wanted.angles is None
+        else DatasetCollector(wanted.regions, frames, instrument, wanted.angles)
+    )
     file_names = _file_names(wanted.regions)
-    if wanted.angles is not None:
-        require_same_series(frames.names, wanted.angles)
-    names: list[str] = []
+    sinks: list[Sink[Any]] = [whole, parts]
+    names = ["summary.csv"]
     with complete_folder(directory) as temporary:
-        gallery = Gallery(frames, temporary, name, wanted.regions) if wanted.pictures else None
-        with ExitStack() as stack:
-            maps: MapWriter | None = None
-            if wanted.maps is not None:
-                names.append(f"stokes.{wanted.maps}")
-                described = {"title": f"Stokes parameters of {name}", "source": f"pbrdf {__version__}"}
-                maps = MapWriter(
-                    temporary / names[-1], frames, instrument, angles=wanted.angles, attrs=described
-                )
-                stack.enter_context(maps)
-
-            def finish(block: Block) -> tuple[Block, dict[str, np.ndarray] | None, BlockSums | None]:
-                pixels = None if maps is None else pixel_maps(block.image, maps.names)
-                sums = None if gallery is None else gallery.sums(block.series, block.first_row, block.image)
-                return block, pixels, sums
-
-            for block, pixels, sums in reduced_blocks(
-                frames,
-                instrument,
-                finish,
-                dark_level=dark_level,
-                weighted=weighted,
-                max_memory=max_memory,
-                progress=progress,
-            ):
-                collector.add(block)
-                if maps is not None and pixels is not None:
-                    maps.write(block.series, block.first_row, pixels)
-                if gallery is not None:
-                    gallery.add(block.series, sums)
-        averages = collector.averages(instrument)
-        write_averages(averages, frames.names, temporary / "summary.csv")
-        names.insert(0, "summary.csv")
-        if wanted.angles is not None:
-            measured = {region: averages[region] for region in wanted.regions}
+        if wanted.maps is not None:
+            names.append(f"stokes.{wanted.maps}")
+            described = {"title": f"Stokes parameters of {name}", "source": f"pbrdf {__version__}"}
+            sinks.append(
+                MapWriter(temporary / names[-1], frames, instrument, angles=wanted.angles, attrs=described)
+            )
+        gallery = Gallery(frames, temporary, name, wanted.regions)
+        if wanted.pictures:
+            sinks.append(gallery)
+        reduce(
+            frames,
+            instrument,
+            sinks,
+            dark_level=dark_level,
+            weighted=weighted,
+            max_memory=max_memory,
+            progress=progress,
+        )
+        averages = {**whole.averages(), **parts.averages()}
+        write_averages(averages, frames.names, temporary / names[0])
+        if isinstance(parts, DatasetCollector):
             attrs = {"source": f"{name}, reduced by pbrdf {__version__}"}
-            datasets = datasets_of_averages(measured, frames.names, instrument, wanted.angles, attrs=attrs)
-            for region, dataset in datasets.items():
-                write(dataset, temporary / f"{file_names[region]}{wanted.datasets}")
+            for region, dataset in parts.datasets(attrs=attrs).items():
                 names.append(f"{file_names[region]}{wanted.datasets}")
-        if gallery is not None:
-            gallery.close()
-            names += gallery.files
+                write(dataset, temporary / names[-1])
+        names += gallery.files
     return Reduction(averages, [directory / n for n in names])
 
 

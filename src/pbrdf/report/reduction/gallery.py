@@ -9,7 +9,7 @@ import numpy as np
 
 from pbrdf.instruments.frames.frames import Frames
 from pbrdf.instruments.reduction.regions import Region
-from pbrdf.instruments.reduction.stokes_image import StokesImage
+from pbrdf.instruments.reduction.streaming import Block
 from pbrdf.report.reduction.picture_sums import BlockSums, Picture, PictureSum, block_size, block_sums
 from pbrdf.report.reduction.quicklook import overview_figure, quicklook_figure
 from pbrdf.report.style import save_figure
@@ -23,7 +23,7 @@ _SMALL = 210
 
 
 class Gallery:
-    """Quick looks of some series, and an overview.
+    """Quick looks of some series, and an overview: a sink for :func:`pbrdf.instruments.reduction.reduce.reduce`.
 
     Parameters
     ----------
@@ -45,28 +45,38 @@ class Gallery:
         self._large = set(_spread(count, _QUICKLOOKS))
         self._current: tuple[int, PictureSum] | None = None
         self._thumbnails: dict[int, Picture] = {}
+        self.rows = (0, frames.rows)
         #: Names of the files written so far.
         self.files: list[str] = []
 
-    def sums(self, series: int, first_row: int, image: StokesImage) -> BlockSums | None:
-        """What is needed of some rows; None if the series is not drawn. Any thread may call this."""
-        if series not in self._small | self._large:
-            return None
-        return block_sums(image, first_row, self._size)
+    def __enter__(self) -> Gallery:
+        return self
 
-    def add(self, series: int, sums: BlockSums | None) -> None:
-        """Add what :meth:`sums` returned; the series come one after another."""
-        if self._current is not None and self._current[0] != series:
+    def prepare(self, block: Block) -> BlockSums | None:
+        """What is needed of some rows; None if the series is not drawn."""
+        if block.series not in self._small | self._large:
+            return None
+        return block_sums(block.image, block.first_row, self._size)
+
+    def add(self, block: Block, part: BlockSums | None) -> None:
+        """Add what :meth:`prepare` made of a block, and draw the series before it if this is the first of another."""
+        if self._current is not None and self._current[0] != block.series:
             self._finish()
-        if sums is None:
+        if part is None:
             return
         if self._current is None:
-            self._current = (series, PictureSum(self._frames.rows, self._frames.columns))
-        self._current[1].add(sums)
+            self._current = (block.series, PictureSum(self._frames.rows, self._frames.columns))
+        self._current[1].add(part)
 
-    def close(self) -> None:
-        """Draw the last series and the overview."""
-        self._finish()
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        if kind is None:
+            self._finish()
+            self._draw_overview()
+            return
+        for file in self.files:
+            (self._folder / file).unlink(missing_ok=True)
+
+    def _draw_overview(self) -> None:
         if len(self._frames.names) < 2:
             return
         shown = sorted(self._thumbnails)

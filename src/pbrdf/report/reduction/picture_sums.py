@@ -11,12 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from pbrdf.instruments.polarimeter.polarization_errors import polarization
-from pbrdf.instruments.reduction.stokes_image import PixelFlag, StokesImage
+from pbrdf.instruments.reduction.stokes_image import BAD_FLAGS, StokesImage
 
-__all__ = ["MASKED", "BlockSums", "Picture", "PictureSum", "block_sums"]
+__all__ = ["BlockSums", "Picture", "PictureSum", "block_sums"]
 
-#: Why pixels are masked; 1, 2, 3 in the mask of a picture.
-MASKED = (PixelFlag.SATURATED, PixelFlag.DEAD, PixelFlag.DARK)
 #: Blocks along the longer side of a picture, at most.
 _BLOCKS = 640
 #: Rows of blocks that are worked on at a time.
@@ -55,7 +53,7 @@ def block_sums(image: StokesImage, first_row: int, size: int) -> BlockSums:
     stack = np.stack(
         [np.where(good, layer, 0.0) for layer in layers]
         + [good.astype(float)]
-        + [(image.flags & flag != 0).astype(float) for flag in MASKED]
+        + [(image.flags & flag != 0).astype(float) for flag in BAD_FLAGS]
     )
     rows, columns = good.shape
     # edges of the blocks among these rows: the first block may have begun above
@@ -122,7 +120,7 @@ class Picture:
     intensity, dolp, aolp, aolp_std
         Digital numbers, a ratio, degrees.
     mask
-        0, or 1, 2, 3 where most pixels are saturated, dead, dark.
+        0, or 1, 2, 3 where most pixels are saturated, dead, dark: the order of BAD_FLAGS.
     shape
         Rows and columns of the whole picture.
     size

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pbrdf.instruments.reduction.regions import Region
-from pbrdf.report.reduction.picture_sums import MASKED, Picture
+from pbrdf.instruments.reduction.stokes_image import BAD_FLAGS
+from pbrdf.report.reduction.picture_sums import Picture
 from pbrdf.report.style import styled
 
 if TYPE_CHECKING:
@@ -29,7 +30,7 @@ _DOLP_TOPS = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
 #: What a scale leaves out above, so that single bright pixels do not darken the rest.
 _BRIGHTEST = 99.5
 #: Colours of masked pixels; the maps of colours have none of them.
-_MASKED = dict(zip(MASKED, ("#FF5A00", "#00A878", "#56B4E9"), strict=True))
+_MASKED = dict(zip(BAD_FLAGS, ("#FF5A00", "#00A878", "#56B4E9"), strict=True))
 _NOT_SHOWN = "#9A9A9A"
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from pbrdf.data.schema import std_name
 from pbrdf.instruments.polarimeter.polarization_errors import debiased_dolp, polarization
-from pbrdf.instruments.reduction.regions import RegionAverage
+from pbrdf.instruments.reduction.region_averages import RegionAverage
 from pbrdf.optics.stokes import STOKES
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from pbrdf.instruments.goniometer.protocols import BISTATIC, Protocol
 from pbrdf.instruments.goniometer.source import Source
 from pbrdf.instruments.polarimeter.instrument import Instrument
 from pbrdf.instruments.polarimeter.presets import preset
-from pbrdf.instruments.reduction.series import goniometric_datasets
+from pbrdf.instruments.reduction.goniometric_datasets import goniometric_datasets
 from pbrdf.instruments.virtual.experiment import CALIBRATIONS, EXPOSURES, VirtualExperiment
 from pbrdf.reproduction.experiment.sample import SCALE
 from pbrdf.reproduction.paper import PAPER, SAMPLES, SIMULATED

@@ -10,9 +10,9 @@ from PIL import Image
 
 from pbrdf.instruments.frames.frame_files import open_frames
 from pbrdf.instruments.polarimeter.presets import preset
+from pbrdf.instruments.reduction.reduce import reduce
+from pbrdf.instruments.reduction.region_averages import RegionCollector
 from pbrdf.instruments.reduction.regions import Ellipse
-from pbrdf.instruments.reduction.series import RegionCollector
-from pbrdf.instruments.reduction.streaming import reduced_blocks
 from pbrdf.optics.stokes import aolp, dolp
 
 #: Within each of the four polarisers, in cells of the mosaic; a wall beside them; and their AoLP, degrees.
@@ -34,10 +34,9 @@ def picture(measured):
 def reduced(path, weighted):
     instrument = preset("sony_imx250mzr")
     frames = open_frames(path, instrument)
-    collector = RegionCollector(REGIONS, frames)
-    for block in reduced_blocks(frames, instrument, lambda block: block, weighted=weighted, rows=(180, 650)):
-        collector.add(block)
-    return {name: means[0] for name, means in collector.averages(instrument).items()}
+    collector = RegionCollector(REGIONS, frames, instrument)
+    reduce(frames, instrument, [collector], weighted=weighted)
+    return {name: means[0] for name, means in collector.averages().items()}
 
 
 @pytest.mark.parametrize("weighted", [True, False])

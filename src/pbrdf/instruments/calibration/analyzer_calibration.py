@@ -1,4 +1,4 @@
-"""Calibration of a polarimeter by known input states, and how accurate it is.
+"""Calibration of a polarimeter's analyser vectors by known input states, and how accurate it is.
 
 Intensities I (N states × K inputs) of known Stokes vectors S (4 × K) give the analyser vectors W = I S⁺, for the whole
 field of view, for cells of it, or pixel by pixel. Inputs held out from the solution are then reduced with it: the rms
@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pbrdf.errors import DataError
-from pbrdf.instruments.calibration.cell_means import Readings, read_inputs
 from pbrdf.instruments.polarimeter.polarimeter import Polarimeter, measured
 from pbrdf.instruments.polarimeter.stokes_solution import solve_stokes
 from pbrdf.optics import stokes as degrees
@@ -25,11 +24,9 @@ from pbrdf.optics.stokes import STOKES
 __all__ = [
     "Accuracy",
     "Calibration",
-    "Readings",
     "accuracy_of",
     "calibrate",
     "input_errors",
-    "read_inputs",
     "reduced_inputs",
     "standard_inputs",
     "verify",

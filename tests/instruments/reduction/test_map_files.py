@@ -15,24 +15,16 @@ from pbrdf.instruments.polarimeter.instrument import Instrument
 from pbrdf.instruments.polarimeter.polarimeter import lcvr, rotating_polarizer
 from pbrdf.instruments.polarimeter.polarization_errors import debiased_dolp, polarization
 from pbrdf.instruments.polarimeter.retardance_sets import retardance_set
+from pbrdf.instruments.reduction.map_files import MapWriter
+from pbrdf.instruments.reduction.reduce import reduce
 from pbrdf.instruments.reduction.stokes_image import reduce_frames
-from pbrdf.instruments.reduction.stokes_maps import MapWriter, pixel_maps
-from pbrdf.instruments.reduction.streaming import reduced_blocks
 
 DETECTOR = Detector(bits=12, gain=3.0, read_noise=5.0, offset=60.0)
 
 
 def written(path, polarimeter, frames, **options):
     instrument = Instrument(polarimeter, DETECTOR, reference_angle=np.deg2rad(20.0))
-    with MapWriter(path, frames, instrument, **options) as maps:
-        blocks = reduced_blocks(
-            frames,
-            instrument,
-            lambda block: (block.series, block.first_row, pixel_maps(block.image, maps.names)),
-            max_memory=1_000_000,
-        )
-        for block in blocks:
-            maps.write(*block)
+    reduce(frames, instrument, [MapWriter(path, frames, instrument, **options)], max_memory=1_000_000)
     if path.suffix == ".zarr":
         return xr.open_dataset(path, engine="zarr", consolidated=False).load()
     return xr.open_dataset(path, engine="h5netcdf").load()

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from pbrdf.errors import DataError
-from pbrdf.instruments.calibration.known_inputs import calibrate, read_inputs, standard_inputs, verify
+from pbrdf.instruments.calibration.analyzer_calibration import calibrate, standard_inputs, verify
+from pbrdf.instruments.calibration.cell_means import cell_means
 from pbrdf.instruments.polarimeter.detector import Detector
 from pbrdf.instruments.polarimeter.polarimeter import lcvr, measured, rotating_polarizer
 from pbrdf.instruments.polarimeter.retardance_sets import retardance_set
-from pbrdf.instruments.reduction.stokes_image import PixelFlag, reduce_frames
+from pbrdf.instruments.reduction.stokes_image import reduce_frames
 from pbrdf.instruments.virtual.miscalibration import miscalibrated
 
 NOMINAL = lcvr(retardance_set("six_states"))
@@ -24,21 +25,6 @@ def field(rows, columns, seed=0):
     shift = np.deg2rad(6 * x - 4 * y)[..., None, None]
     cells = [lcvr(retardance_set("six_states") + s).analyzer for s in shift.reshape(-1, 1, 1)]
     return measured(np.array(cells).reshape(rows, columns, 6, 4))
-
-
-def frames_at_inputs(polarimeter, level, shape, seed=0):
-    """Raw frames (states, inputs, rows, columns) of even light."""
-    rng = np.random.default_rng(seed)
-    frames = [
-        DETECTOR.expose(
-            polarimeter.intensities(level * s[:, None, None] * np.ones((4, *shape)))
-            if polarimeter.is_map
-            else np.multiply.outer(polarimeter.intensities(level * s), np.ones(shape)),
-            rng,
-        )
-        for s in INPUTS.T
-    ]
-    return np.stack(frames, axis=1)
 
 
 def test_standard_inputs():
@@ -161,42 +147,6 @@ def test_linear_polarisers_need_no_circular_input():
     assert found.polarimeter.states == truth.states
 
 
-@pytest.mark.parametrize("cells", [(1, 1), (2, 3), None])
-def test_readings_are_means_over_cells(cells):
-    """Means and their variance over exactly the pixels that the map's cell serves (10 × 11 pixels, cells uneven)."""
-    rng = np.random.default_rng(4)
-    frames = rng.integers(100, 2000, size=(2, 3, 10, 11)).astype(np.uint16)
-    found = read_inputs(frames, DETECTOR, cells=cells)
-    shape = (10, 11) if cells is None else cells
-    of = measured(np.arange(shape[0] * shape[1] * 4.0).reshape(*shape, 1, 4)).spread(10, 11)[..., 0, 0] / 4
-    for i in range(shape[0] * shape[1]):
-        part = frames[..., of == i]
-        place = () if cells == (1, 1) else np.unravel_index(i, shape)
-        index = (..., *place)
-        assert found.pixels[place] == part.shape[-1]
-        np.testing.assert_allclose(found.intensities[index], part.mean(axis=-1) - DETECTOR.black)
-        expected = DETECTOR.variance(part).sum(axis=-1) / part.shape[-1] ** 2
-        np.testing.assert_allclose(found.variance[index], expected)
-
-
-def test_bad_pixels_are_kept_out_and_counted():
-    """Saturated, dead and dark pixels, each bad at one input only, are out at all inputs: the readings are those of the
-    other pixels."""
-    frames = frames_at_inputs(NOMINAL, 3000.0, (6, 8))
-    clean = frames.copy()
-    frames[2, 5, 0, 0] = 2**14 - 1
-    frames[:, 7, 1, 1] = 55
-    dead = np.zeros((6, 8), dtype=bool)
-    dead[5, 7] = True
-    frames[:, :, 5, 7] = 3
-    found = read_inputs(frames, DETECTOR, dead=dead)
-    assert found.counts() == {"good": 45, "saturated": 1, "dead": 1, "dark": 1}
-    assert found.flags[0, 0] == PixelFlag.SATURATED and found.flags[1, 1] == PixelFlag.DARK
-    good = found.flags == 0
-    np.testing.assert_allclose(found.intensities, clean[..., good].mean(axis=-1) - DETECTOR.black)
-    assert found.pixels == 45
-
-
 def test_cells_without_a_good_pixel_take_their_neighbour():
     truth = field(2, 3)
     read = np.einsum("yxnk,ki->niyx", truth.analyzer, INPUTS)
@@ -227,8 +177,8 @@ def test_from_frames_to_a_map_that_reduces_pictures():
         ],
         axis=1,
     )
-    readings = read_inputs(frames, DETECTOR, cells=(4, 4), flat=flat)
-    found = calibrate(readings.intensities, levels, variance=readings.variance)
+    means = cell_means(frames, DETECTOR, cells=(4, 4), flat=flat)
+    found = calibrate(means.intensities, levels, variance=means.variance)
     light = np.array([5000.0, 2000.0, -1500.0, 1000.0])
     signal = truth.intensities(light[:, None, None] * np.ones((4, *shape))) * flat
     image = reduce_frames(DETECTOR.expose(signal, rng), found.polarimeter, DETECTOR, flat=flat)
@@ -254,13 +204,5 @@ def test_errors():
         calibrate(np.ones((6, 14)), INPUTS, held_out=[14])
     with pytest.raises(DataError, match="'each'"):
         calibrate(np.ones((6, 14)), INPUTS, held_out="all")
-    with pytest.raises(DataError, match="states, inputs, rows, columns"):
-        read_inputs(np.ones((2, 3, 4)), DETECTOR)
-    with pytest.raises(DataError, match="cannot be divided"):
-        read_inputs(np.ones((2, 3, 4, 4)), DETECTOR, cells=(5, 1))
-    with pytest.raises(DataError, match="no pixel of the calibration frames is good"):
-        read_inputs(np.zeros((2, 3, 4, 4)), DETECTOR)
-    with pytest.raises(DataError, match="flat field"):
-        read_inputs(np.full((2, 3, 4, 4), 100), DETECTOR, flat=np.zeros((4, 4)))
     with pytest.raises(DataError, match="6 states"):
         verify(NOMINAL, np.ones((5, 14)), INPUTS)

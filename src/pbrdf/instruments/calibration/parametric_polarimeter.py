@@ -12,11 +12,11 @@ from pbrdf.instruments.polarimeter.analyzer_chain import AnalyzerChain
 from pbrdf.instruments.polarimeter.polarimeter import Polarimeter
 from pbrdf.optics.elements import axis_rate, diattenuator, retardance_rate, retarder
 
-__all__ = ["Settings"]
+__all__ = ["ParametricPolarimeter"]
 
 
-class Settings:
-    """The settings of a polarimeter as a vector, and its analyser vectors with their derivatives."""
+class ParametricPolarimeter:
+    """A polarimeter as a function of its settings: a vector of these, and its analyser vectors with derivatives."""
 
     def __init__(self, nominal: Polarimeter, gain: str, shared: bool, start_gain: float) -> None:
         self.nominal = nominal.details

@@ -11,8 +11,8 @@ from pbrdf.instruments.polarimeter.detector import Detector
 from pbrdf.instruments.polarimeter.instrument import Instrument
 from pbrdf.instruments.polarimeter.polarimeter import lcvr, rotating_polarizer
 from pbrdf.instruments.polarimeter.retardance_sets import retardance_set
+from pbrdf.instruments.reduction.goniometric_datasets import goniometric_datasets
 from pbrdf.instruments.reduction.regions import Rectangle
-from pbrdf.instruments.reduction.series import goniometric_datasets
 from pbrdf.optics.elements import rotate_frame
 
 FULL = lcvr(retardance_set("tetrahedron"))

@@ -11,7 +11,8 @@ flag is NaN.
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+import shutil
+from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -26,15 +27,14 @@ from pbrdf.instruments.frames.frames import Frames
 from pbrdf.instruments.goniometer.angle_table import AngleTable
 from pbrdf.instruments.polarimeter.instrument import Instrument
 from pbrdf.instruments.polarimeter.polarization_errors import debiased_dolp, polarization
-from pbrdf.instruments.reduction.stokes_image import PixelFlag, StokesImage
+from pbrdf.instruments.reduction.stokes_image import BAD_FLAGS
+from pbrdf.instruments.reduction.streaming import Block
 from pbrdf.optics.stokes import STOKES
 
-__all__ = ["MapWriter", "pixel_maps"]
+__all__ = ["MapWriter"]
 
 #: Rows of a chunk of a file are so many that it holds about this many bytes.
 _CHUNK = 2**18
-
-_FLAGS = (PixelFlag.SATURATED, PixelFlag.DEAD, PixelFlag.DARK)
 
 #: Units and long name of each variable, and which Stokes components it needs.
 _VARIABLES: dict[str, tuple[str, str, tuple[int, ...]]] = {
@@ -61,49 +61,15 @@ _VARIABLES: dict[str, tuple[str, str, tuple[int, ...]]] = {
 }
 
 
-def pixel_maps(image: StokesImage, names: Sequence[str]) -> dict[str, np.ndarray]:
-    """What is stored of some rows.
-
-    Parameters
-    ----------
-    image
-        The rows, reduced.
-    names
-        Which variables, of :attr:`MapWriter.names`.
-
-    Returns
-    -------
-    dict of str to ndarray
-        By the name of the variable, float32 but for the flags, angles in degrees, shape (rows, columns).
-    """
-    good = image.flags == 0
-    stokes = np.where(good, image.stokes, np.nan)
-    covariance = np.where(good, image.covariance, np.nan)
-    found = polarization(stokes, covariance)
-    values = {
-        **dict(zip(STOKES, stokes, strict=True)),
-        **{name: covariance[i, j] for (i, j), name in COVARIANCES.items()},
-        "dolp": found.dolp,
-        "dolp_debiased": debiased_dolp(stokes, covariance),
-        "dolp_std": found.dolp_std,
-        "aolp": np.rad2deg(found.aolp),
-        "aolp_std": np.rad2deg(found.aolp_std),
-        "docp": found.docp,
-        "docp_std": found.docp_std,
-    }
-    return {
-        name: image.flags if name == "flags" else values[name].astype(np.float32, copy=False)
-        for name in names
-    }
-
-
 class MapWriter:
-    """A file of Stokes parameters being written; use it in a ``with`` statement.
+    """A file of Stokes parameters pixel by pixel: a sink for :func:`pbrdf.instruments.reduction.reduce.reduce`.
+
+    The file is there from the first block on; if the reduction fails, it goes.
 
     Parameters
     ----------
     path
-        The new file, ``.nc``, or folder, ``.zarr``; nothing of that name must exist.
+        The new file, ``.nc``, or folder, ``.zarr``.
     frames, instrument
         What was measured, and with what.
     angles
@@ -119,105 +85,161 @@ class MapWriter:
     Raises
     ------
     DataError
-        If the extension is another one, or zarr is not installed.
+        If the extension is another one, zarr is not installed, or the angles lack a series; when the first block is
+        due, if there is something of that name.
     """
 
     def __init__(
         self,
-        path: Path,
+        path: str | Path,
         frames: Frames,
         instrument: Instrument,
         *,
         angles: AngleTable | None = None,
         attrs: dict[str, Any] | None = None,
     ) -> None:
-        kind = path.suffix.lower()
-        if kind not in (".nc", ".zarr"):
+        path = Path(path)
+        self._kind = path.suffix.lower()
+        if self._kind not in (".nc", ".zarr"):
             raise DataError(f"{path}: Stokes pictures are written as .nc or .zarr")
-        head = _head(frames, instrument, angles, attrs or {})
-        shape = (len(frames.names), frames.rows, frames.columns)
-        chunks = (1, min(max(_CHUNK // (4 * frames.columns), 1), frames.rows), frames.columns)
-        self._rows, self._chunk_rows = frames.rows, chunks[1]
-        self._file: Any
-        if kind == ".nc":
-            import h5netcdf
-
-            head.to_netcdf(path, engine="h5netcdf")
-            self._file = h5netcdf.File(path, "a")
-        else:
+        if self._kind == ".zarr":
             require_zarr(path)
-            import zarr
-
-            head.to_zarr(path, mode="w-", zarr_format=2, consolidated=False)
-            self._file = zarr.open_group(path, mode="r+", zarr_format=2)
-        masks = {
-            "long_name": "why a pixel was left out; 0 is a good pixel",
-            "flag_masks": np.array([flag.value for flag in _FLAGS], dtype=np.uint8).tolist(),
-            "flag_meanings": " ".join(str(flag.name).lower() for flag in _FLAGS),
-        }
+        self._path = path
+        self._head = _head(frames, instrument, angles, attrs or {})
+        self._shape = (len(frames.names), frames.rows, frames.columns)
+        self._chunk_shape = (1, min(max(_CHUNK // (4 * frames.columns), 1), frames.rows), frames.columns)
+        self.rows = (0, frames.rows)
         determined = instrument.polarimeter.determined
-        described = {
+        self._attributes: dict[str, dict[str, Any]] = {
             name: {"units": units, "long_name": words}
             for name, (units, words, needs) in _VARIABLES.items()
             if determined[list(needs)].all()
         }
-        self._variables = {
-            name: self._create(kind, name, shape, chunks, attributes)
-            for name, attributes in {**described, "flags": masks}.items()
+        self._attributes["flags"] = {
+            "long_name": "why a pixel was left out; 0 is a good pixel",
+            "flag_masks": np.array([flag.value for flag in BAD_FLAGS], dtype=np.uint8).tolist(),
+            "flag_meanings": " ".join(str(flag.name).lower() for flag in BAD_FLAGS),
         }
-        self.names = tuple(self._variables)
-        self._part = {name: np.empty(chunks[1:], _type(name)) for name in self.names}
-        if kind == ".nc":
+        self.names = tuple(self._attributes)
+        self._buffers: dict[str, np.ndarray] = {}
+        self._variables: dict[str, Any] = {}
+        self._file: Any = None
+
+    def __enter__(self) -> MapWriter:
+        if self._path.exists():
+            raise DataError(f"{self._path}: there is something of that name already")
+        try:
+            self._create()
+        except BaseException:
+            self._remove()
+            raise
+        return self
+
+    def _create(self) -> None:
+        """Write all but the numbers."""
+        if self._kind == ".nc":
+            import h5netcdf
+
+            self._head.to_netcdf(self._path, engine="h5netcdf")
+            self._file = h5netcdf.File(self._path, "a")
+        else:
+            import zarr
+
+            self._head.to_zarr(self._path, mode="w-", zarr_format=2, consolidated=False)
+            self._file = zarr.open_group(self._path, mode="r+", zarr_format=2)
+        self._variables = {name: self._variable(name) for name in self.names}
+        self._buffers = {name: np.empty(self._chunk_shape[1:], _type(name)) for name in self.names}
+        if self._kind == ".nc":
             # the file is complete but for its numbers, and h5py writes small parts of them faster
             import h5py
 
             self._file.close()
             # rows come in order: one chunk of each variable has to be kept, not the usual megabytes
-            self._file = h5py.File(path, "r+", rdcc_nbytes=2 * _CHUNK)
+            self._file = h5py.File(self._path, "r+", rdcc_nbytes=2 * _CHUNK)
             self._variables = {name: self._file[name] for name in self.names}
 
-    def _create(
-        self,
-        kind: str,
-        name: str,
-        shape: tuple[int, ...],
-        chunks: tuple[int, ...],
-        attributes: dict[str, Any],
-    ) -> Any:
+    def _variable(self, name: str) -> Any:
         dims = ("series", "y", "x")
         dtype = _type(name)
+        attributes = self._attributes[name]
         # a flag is never missing: 0 is a good pixel
         fill = None if name == "flags" else np.float32(np.nan)
-        if kind == ".nc":
-            variable = self._file.create_variable(name, dims, dtype, chunks=chunks, fillvalue=fill)
+        if self._kind == ".nc":
+            variable = self._file.create_variable(name, dims, dtype, chunks=self._chunk_shape, fillvalue=fill)
         else:
-            variable = self._file.create_array(name, shape=shape, chunks=chunks, dtype=dtype, fill_value=fill)
+            variable = self._file.create_array(
+                name, shape=self._shape, chunks=self._chunk_shape, dtype=dtype, fill_value=fill
+            )
             attributes = {**attributes, "_ARRAY_DIMENSIONS": list(dims)}
         for key, value in attributes.items():
             variable.attrs[key] = value
         return variable
 
-    def write(self, series: int, first_row: int, maps: dict[str, np.ndarray]) -> None:
-        """Write what :func:`pixel_maps` made of some rows of a series; all rows must come, in their order."""
+    def prepare(self, block: Block) -> dict[str, np.ndarray]:
+        """What is stored of a block.
+
+        Returns
+        -------
+        dict of str to ndarray
+            By the name of the variable, float32 but for the flags, angles in degrees, shape (rows, columns).
+        """
+        image = block.image
+        good = image.flags == 0
+        stokes = np.where(good, image.stokes, np.nan)
+        covariance = np.where(good, image.covariance, np.nan)
+        found = polarization(stokes, covariance)
+        values = {
+            **dict(zip(STOKES, stokes, strict=True)),
+            **{name: covariance[i, j] for (i, j), name in COVARIANCES.items()},
+            "dolp": found.dolp,
+            "dolp_debiased": debiased_dolp(stokes, covariance),
+            "dolp_std": found.dolp_std,
+            "aolp": np.rad2deg(found.aolp),
+            "aolp_std": np.rad2deg(found.aolp_std),
+            "docp": found.docp,
+            "docp_std": found.docp_std,
+        }
+        return {
+            name: image.flags if name == "flags" else values[name].astype(np.float32, copy=False)
+            for name in self.names
+        }
+
+    def add(self, block: Block, part: dict[str, np.ndarray]) -> None:
+        """Write what :meth:`prepare` made of a block; all rows must come, in their order."""
         # whole chunks only: a part of a chunk would make the file be read, packed and written again
-        high, rows = self._chunk_rows, self._rows
-        done, count = 0, len(maps["flags"])
+        high, rows = self._chunk_shape[1], self._shape[1]
+        done, count = 0, len(part["flags"])
         while done < count:
-            row = first_row + done
+            row = block.first_row + done
             start, end = row // high * high, min((row // high + 1) * high, rows)
             taken = min(end - row, count - done)
-            for name, part in self._part.items():
-                part[row - start : row - start + taken] = maps[name][done : done + taken]
+            for name, buffer in self._buffers.items():
+                buffer[row - start : row - start + taken] = part[name][done : done + taken]
                 if row + taken == end:
-                    self._variables[name][series, start:end, :] = part[: end - start]
+                    self._variables[name][block.series, start:end, :] = buffer[: end - start]
             done += taken
 
-    def __enter__(self) -> MapWriter:
-        return self
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        try:
+            self._close()
+        except BaseException:
+            self._remove()
+            raise
+        if kind is not None:
+            self._remove()
 
-    def __exit__(self, *_: object) -> None:
+    def _close(self) -> None:
         if hasattr(self._file, "close"):
             self._file.close()
+
+    def _remove(self) -> None:
+        """Leave nothing half-written."""
+        with suppress(Exception):  # the error that matters is another one
+            self._close()
+        if self._path.is_dir():
+            shutil.rmtree(self._path, ignore_errors=True)
+        else:
+            self._path.unlink(missing_ok=True)
 
 
 def _type(name: str) -> np.dtype[Any]:

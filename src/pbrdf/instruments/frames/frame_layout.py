@@ -1,0 +1,76 @@
+"""The table ``[frames]`` of an instrument's file: how pictures are called, and which of them correct the frames."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pbrdf.errors import DataError
+
+__all__ = ["FrameLayout"]
+
+
+@dataclass(frozen=True)
+class FrameLayout:
+    """The table ``[frames]`` of an instrument's file.
+
+    Attributes
+    ----------
+    pattern
+        How the files of a folder are called, with ``{series}`` and ``{state}`` for the names; with a slash for folders
+        in the folder, ``{series}/{state}``; None: what :func:`pbrdf.instruments.frames.frame_files.open_frames` finds.
+    dark_frame
+        Picture taken with the light shut out, the same for all states.
+    flat_field
+        Picture of an even field of natural light.
+    dead_pixels
+        Picture that is not 0 where a pixel must not be used.
+    dark_exposures, flat_exposures
+        How many exposures the dark frame and the flat field are the mean of: their noise is that much less.
+    flat_transmittance
+        Of a mosaic's states for the light of the flat field, in any unit; None for what the polarimeter says of natural
+        light. A calibration made with the flat field holds for that of the nominal polarimeter, and writes it here.
+    """
+
+    pattern: str | None = None
+    dark_frame: Path | None = None
+    flat_field: Path | None = None
+    dead_pixels: Path | None = None
+    dark_exposures: int = 1
+    flat_exposures: int = 1
+    flat_transmittance: tuple[float, ...] | None = None
+
+    @classmethod
+    def from_table(cls, table: dict[str, Any], folder: Path | None = None) -> FrameLayout:
+        """Check the table; names of files are relative to `folder`.
+
+        Raises
+        ------
+        DataError
+            If a key is not known or a value is not what it should be.
+        """
+        known = tuple(cls.__dataclass_fields__)
+        values: dict[str, Any] = {}
+        for key, value in table.items():
+            if key not in known:
+                raise DataError(f"[frames] {key}: there is no such key; use {', '.join(known)}")
+            if key.endswith("_exposures"):
+                if not (isinstance(value, int) and not isinstance(value, bool) and value >= 1):
+                    raise DataError(f"[frames] {key} is {value!r}: give a whole number from 1")
+                values[key] = value
+            elif key == "flat_transmittance":
+                numbers = isinstance(value, list) and all(type(v) in (int, float) and v > 0.0 for v in value)
+                if not numbers:
+                    raise DataError(f"[frames] {key} is {value!r}: give a list of numbers more than 0")
+                values[key] = tuple(map(float, value))
+            elif not isinstance(value, str) or not value:
+                raise DataError(f"[frames] {key} is {value!r}: give a text in quotes")
+            else:
+                values[key] = value if key == "pattern" else (folder or Path()) / value
+        return cls(**values)
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """Files that are not frames themselves."""
+        return tuple(f for f in (self.dark_frame, self.flat_field, self.dead_pixels) if f is not None)
