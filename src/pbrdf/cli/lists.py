@@ -18,6 +18,7 @@ def paints(as_json: AsJson = False) -> None:
     from rich.table import Table
 
     from pbrdf.data.paints import PAINTS, WAVELENGTH, load_paint
+    from pbrdf.models import DoubleGauss
 
     if as_json:
         content = {
@@ -30,10 +31,12 @@ def paints(as_json: AsJson = False) -> None:
         return
     table = Table(box=None, pad_edge=False, title=None)
     table.add_column("paint")
-    for symbol in ("σ", "n", "a", "k", "b", "t"):
-        table.add_column(symbol, justify="right")
-    for name, values in PAINTS.items():
-        table.add_row(name, *(f"{value:.4f}" for value in values))
+    listed = [p for p in DoubleGauss.parameters if p.fitted]
+    for p in listed:
+        table.add_column(p.symbol, justify="right")
+    for name in PAINTS:
+        values = load_paint(name).values
+        table.add_row(name, *(f"{values[p.name]:.4f}" for p in listed))
     console = output_console()
     console.print(table)
     console.print(f"\nModel double-gauss at {WAVELENGTH:g} nm. Source: {_SOURCE}; {_SCALE}.")

@@ -12,7 +12,6 @@ same function is traced into a fit, an evaluation or a renderer's kernel.
 ``facets``            slope statistics of the facets: eq. (3)
 ``shadowing``         shadowing and masking: eq. (4) and its alternatives
 ``diffuse``           modified Rahman-Pinty-Verstraete shape: eqs (9)-(10)
-``half_difference``   half and difference angles, tilt of the mirror facet
 ``quadrature``        averages over the lit and seen facets
 ``transport``         their nodes for rendering
 ``powers``            powers, fast in single precision
@@ -20,5 +19,6 @@ same function is traced into a fit, an evaluation or a renderer's kernel.
 ``stokes``            degree and angle of polarisation, of arrays of any kind
 ``mueller``           physical realisability of Mueller matrices
 ``elements``          polarisers and retarders, in the frame of an instrument
-====================  =====================================================================
+====================  =================================================``half_difference``   half and difference angles, tilt of the mirror facet
+====================
 """
