@@ -1,4 +1,5 @@
-# Two commands do all the set-up: `make demo` runs the main job, `make test` passes the tests.
+# Two commands do all the set-up: `make demo` runs the main job, `make test` passes the tests; `make quick` passes
+# those that are fast.
 # Both make a virtual environment in .venv and install what they need. Needed: Python ≥ 3.11 and make.
 
 PYTHON ?= python3
@@ -7,16 +8,22 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 TEST_STAMP := $(VENV)/.installed-dev
 
-.PHONY: demo test lint benchmark clean
+.PHONY: demo test quick lint benchmark clean
 
 demo: $(STAMP)
 	$(BIN)/pbrdf reproduce --output demo
 
-test: $(TEST_STAMP)
+test: lint
+	$(BIN)/python -m pytest -n auto --dist worksteal $(PYTEST_ARGS)
+
+quick: lint
+	$(BIN)/python -m pytest -n auto --dist worksteal -m 'not slow' $(PYTEST_ARGS)
+
+lint: $(TEST_STAMP)
 	$(BIN)/ruff check src tests benchmarks scripts docs/examples
 	$(BIN)/ruff format --check src tests benchmarks scripts docs/examples
+	$(BIN)/lint-imports --no-cache
 	$(BIN)/mypy
-	$(BIN)/python -m pytest -n auto $(PYTEST_ARGS)
 
 benchmark: $(TEST_STAMP)
 	$(BIN)/python benchmarks/evaluation.py
