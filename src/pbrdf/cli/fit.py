@@ -37,7 +37,10 @@ def fit(
     *,
     reading: Reading,
     model: Annotated[
-        str, typer.Option(help="Model (see `pbrdf models`), or a model's JSON file to start from as well.")
+        str,
+        typer.Option(
+            help="Model (see `pbrdf models`), FILE.py:Class, or a model's JSON file to start from as well."
+        ),
     ] = "double-gauss",
     option: Annotated[
         list[str] | None,

@@ -71,8 +71,23 @@ def _show_version(wanted: bool) -> None:
         raise typer.Exit
 
 
+def _register(models: list[str] | None) -> None:
+    if models:
+        from pbrdf.models import find_model
+
+        for text in models:
+            find_model(text)
+
+
 @app.callback()
 def options(
+    model: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Make a model of your own known to the command that follows (repeatable).",
+            metavar="FILE.py:Class",
+        ),
+    ] = None,
     version: Annotated[
         bool,
         typer.Option("--version", help="Show the version and leave.", callback=_show_version, is_eager=True),
@@ -82,6 +97,7 @@ def options(
 
     Angles are in degrees. `pbrdf COMMAND --help` explains a command.
     """
+    _register(model)
 
 
 app.command()(fit)

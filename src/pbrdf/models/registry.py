@@ -200,7 +200,10 @@ def load_model(source: str | os.PathLike[str] | Mapping[str, Any]) -> Model:
         raise ModelError(f'{where}not a model: the key "model" is missing')
     cls = MODELS.get(content["model"]) if isinstance(content["model"], str) else None
     if cls is None:
-        raise ModelError(f"{where}unknown model {content['model']!r}: known are {', '.join(MODELS)}")
+        raise ModelError(
+            f"{where}unknown model {content['model']!r}: known are {', '.join(MODELS)}; make one of your own known "
+            "with pbrdf.register, or before a command with pbrdf --model FILE.py:Class"
+        )
     parameters, options = content.get("parameters"), content.get("options", {})
     if not isinstance(parameters, Mapping) or not isinstance(options, Mapping):
         raise ModelError(f'{where}"parameters" and "options" must be tables of name and value')

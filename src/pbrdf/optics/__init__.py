@@ -19,6 +19,6 @@ same function is traced into a fit, an evaluation or a renderer's kernel.
 ``stokes``            degree and angle of polarisation, of arrays of any kind
 ``mueller``           physical realisability of Mueller matrices
 ``elements``          polarisers and retarders, in the frame of an instrument
-====================  =================================================``half_difference``   half and difference angles, tilt of the mirror facet
-====================
+``half_difference``   half and difference angles, tilt of the mirror facet
+====================  =====================================================================
 """
