@@ -31,10 +31,11 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from pbrdf.inversion.bootstrap import Bootstrap
+    from pbrdf.inversion.contour import Contour
     from pbrdf.inversion.erroranalysis import ErrorAnalysis
     from pbrdf.inversion.identifiability import Identifiability
     from pbrdf.inversion.plausibility import Finding
-    from pbrdf.inversion.profile import Contour, Profile
+    from pbrdf.inversion.profile import Profile
 
 __all__ = ["Estimate", "FitResult", "Optimum", "fit"]
 
@@ -167,8 +168,8 @@ class FitResult:
         return profile(self, names, **options)
 
     def contour(self, a: str, b: str, **options: Any) -> Contour:
-        """Joint region of two parameters, see :func:`pbrdf.inversion.profile.contour`."""
-        from pbrdf.inversion.profile import contour
+        """Joint region of two parameters, see :func:`pbrdf.inversion.contour.contour`."""
+        from pbrdf.inversion.contour import contour
 
         return contour(self, a, b, **options)
 

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pbrdf.errors import FitError
-from pbrdf.inversion.profile import Optima
+from pbrdf.inversion.refits import Optima
 from pbrdf.inversion.statistics import covariance, prior_spread
 
 if TYPE_CHECKING:

@@ -12,12 +12,13 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from pbrdf.inversion.bootstrap import Bootstrap
+    from pbrdf.inversion.contour import Contour
     from pbrdf.inversion.crossvalidation import CrossValidation
     from pbrdf.inversion.erroranalysis import ErrorAnalysis
     from pbrdf.inversion.fit import FitResult
     from pbrdf.inversion.identifiability import Identifiability
     from pbrdf.inversion.plausibility import Finding
-    from pbrdf.inversion.profile import Contour, Profile
+    from pbrdf.inversion.profile import Profile
 
 __all__ = ["Checks", "run_checks"]
 
