@@ -29,9 +29,12 @@ from rich.table import Table
 
 import pbrdf
 from pbrdf.inversion.bootstrap import simulate
+from pbrdf.inversion.contour import contour
 from pbrdf.inversion.observations import Observations
 from pbrdf.inversion.problem import Space, residuals
-from pbrdf.inversion.profile import Optima, contour, interval_ends, profile
+from pbrdf.inversion.profile import profile
+from pbrdf.inversion.profile_ends import interval_ends
+from pbrdf.inversion.refits import Optima
 from pbrdf.inversion.solver import solve
 
 NAMES = ("sigma", "n", "a", "k", "b", "t")

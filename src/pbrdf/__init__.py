@@ -55,8 +55,9 @@ if TYPE_CHECKING:
         plausibility,
     )
     from pbrdf.inversion.bootstrap import bootstrap
+    from pbrdf.inversion.contour import contour
     from pbrdf.inversion.identifiability import identifiability
-    from pbrdf.inversion.profile import contour, profile
+    from pbrdf.inversion.profile import profile
     from pbrdf.inversion.stored_result import load_fit
     from pbrdf.models import (
         DoubleGauss,
@@ -111,7 +112,7 @@ _HOME = {
     "load_fit": "pbrdf.inversion.stored_result",
     # how far to trust a fit
     "profile": "pbrdf.inversion.profile",
-    "contour": "pbrdf.inversion.profile",
+    "contour": "pbrdf.inversion.contour",
     "bootstrap": "pbrdf.inversion.bootstrap",
     "identifiability": "pbrdf.inversion.identifiability",
     "cross_validate": "pbrdf.inversion",

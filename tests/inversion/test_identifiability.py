@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from linear_helpers import design, linear_fit
 from scipy.optimize import least_squares
-from test_profile import design, linear_fit
 
 import pbrdf
 from pbrdf.errors import FitError

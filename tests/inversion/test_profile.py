@@ -2,84 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from types import SimpleNamespace
-
 import drjit as dr
 import numpy as np
 import pytest
+from linear_helpers import NAMES, design, linear_fit
 from scipy import stats
 from scipy.optimize import brentq, least_squares, lsq_linear
 
-import pbrdf
-from pbrdf.backend import get_backend
 from pbrdf.errors import FitError
-from pbrdf.inversion import profile as module
-from pbrdf.inversion.profile import Optima, contour, interval_ends, profile
+from pbrdf.inversion import refits
+from pbrdf.inversion.profile import profile
 from pbrdf.inversion.solver import Residuals
-
-NAMES = ("x", "y", "z")
-
-
-@dataclass(frozen=True)
-class PlainSpace:
-    """Unknowns that are their own parameters."""
-
-    names: list[str]
-    lower: np.ndarray
-    upper: np.ndarray
-
-    def to_unknowns(self, values):
-        return np.array(values, dtype=float)
-
-    to_parameters = to_unknowns
-
-    @property
-    def box(self):
-        return self.lower, self.upper
-
-
-def design() -> np.ndarray:
-    """30 measurements of three correlated unknowns, shape (30, 3)."""
-    s = np.linspace(0.0, 1.0, 30)
-    return np.column_stack([np.ones_like(s), s, s**2]) * 3.0
-
-
-def linear_fit(monkeypatch, matrix, measured, lower=-50.0, upper=50.0, std_known=True):
-    """A fit of measured = matrix · u with unit standard uncertainties, its optimum by SciPy."""
-    count, size = matrix.shape
-    space = PlainSpace(
-        list(NAMES[:size]), np.broadcast_to(lower, size) * 1.0, np.broadcast_to(upper, size) * 1.0
-    )
-
-    def residuals(space, data, starts=1):
-        backend = get_backend()
-        columns = [backend.upload(backend.Float, column) for column in matrix.T]
-        y = backend.upload(backend.Float, np.concatenate(data))
-
-        def function(u, lane, point):
-            total = sum(dr.gather(backend.Float, c, point) * v for c, v in zip(columns, u, strict=True))
-            return [total - dr.gather(backend.Float, y, (lane // starts) * count + point)], None
-
-        return Residuals(function, count)
-
-    monkeypatch.setattr(module, "residuals", residuals)
-    best = lsq_linear(matrix, measured, (space.lower, space.upper), method="bvls", tol=1e-15)
-    chi2 = 2.0 * best.cost
-    return SimpleNamespace(
-        space=space,
-        data=measured,
-        unknowns=best.x,
-        information=matrix.T @ matrix,
-        std_known=std_known,
-        goodness=SimpleNamespace(data=count, free=size, chi2=chi2, reduced_chi2=chi2 / (count - size)),
-    )
-
-
-@pytest.fixture
-def measured():
-    rng = np.random.default_rng(5)
-    return design() @ [1.0, -2.0, 0.5] + rng.standard_normal(30)
 
 
 @pytest.mark.parametrize("level", [0.68, 0.95, 0.999])
@@ -168,50 +101,11 @@ def test_an_optimum_on_a_bound_gives_one_sided_intervals(monkeypatch, measured):
     assert found.intervals["y"].lower == lower[1] and found.intervals["y"].lower_at_bound
 
 
-def test_many_data_sets_at_once_give_what_each_gives_alone(monkeypatch):
-    rng = np.random.default_rng(8)
-    sets = [design() @ [1.0, -2.0, 0.5] + rng.standard_normal(30) for _ in range(7)]
-    fits = [linear_fit(monkeypatch, design(), y) for y in sets]
-    together = Optima.at(
-        fits[0].space, sets, np.stack([f.unknowns for f in fits]), np.stack([f.information for f in fits])
-    )
-    ends = interval_ends(together, np.full(7, stats.chi2.ppf(0.95, 1)), [0, 2])
-    error = np.sqrt(np.diag(np.linalg.inv(fits[0].information)))
-    assert ends.found.all()
-    for result, found in zip(fits, ends.value, strict=True):
-        expected = [result.unknowns[i] + s * 1.95996 * error[i] for i in (0, 2) for s in (-1, 1)]
-        np.testing.assert_allclose(found, expected, atol=1e-3 * error.min())
-
-
-def test_contours_are_the_joint_ellipses_of_two_parameters(monkeypatch, measured):
-    result = linear_fit(monkeypatch, design(), measured)
-    found = contour(result, "x", "z", levels=(0.68, 0.95), points=21)
-    np.testing.assert_allclose(list(found.rises.values()), [2.2789, 5.9915], atol=1e-4)
-    cov = np.linalg.inv(result.information)[np.ix_([0, 2], [0, 2])]
-    grid = np.stack(np.meshgrid(found.grid["x"], found.grid["z"], indexing="ij"), axis=-1)
-    away = grid - result.unknowns[[0, 2]]
-    expected = np.einsum("abi,ij,abj->ab", away, np.linalg.inv(cov), away)
-    near = expected < 2.0 * 5.9915
-    np.testing.assert_allclose(found.grid["chi2_rise"].values[near], expected[near], rtol=1e-6, atol=1e-8)
-    assert (expected[np.isnan(found.grid["chi2_rise"])] > 2.0 * 5.9915).all()
-    # the grid holds the whole 95 % region, which on each axis is √(5.99/3.84) as wide as a single interval
-    for name, variance in zip(("x", "z"), np.diag(cov), strict=True):
-        span = np.ptp(found.grid[name].values)
-        np.testing.assert_allclose(span, 2.0 * np.sqrt(5.9915 * variance) * 1.25, rtol=1e-3)
-
-
-def test_contour_thresholds_follow_f_where_the_scale_is_estimated(monkeypatch, measured):
-    result = linear_fit(monkeypatch, design(), measured, std_known=False)
-    found = contour(result, "x", "y", levels=(0.9,), points=3)
-    expected = 2.0 * stats.f.ppf(0.9, 2, 27) * result.goodness.reduced_chi2
-    np.testing.assert_allclose(found.rises[0.9], expected)
-
-
 def test_a_curved_problem_gives_an_asymmetric_interval(monkeypatch, measured):
     """r = eᵘ − 3: the ends are ln(3 ± 1.96) in closed form, the lower one four times as far away."""
     result = linear_fit(monkeypatch, design()[:, :1], measured)
     monkeypatch.setattr(
-        module,
+        refits,
         "residuals",
         lambda space, data, starts=1: Residuals(lambda u, lane, point: ([dr.exp(u[0]) - 3.0], None), 1),
     )
@@ -229,22 +123,13 @@ def test_a_better_optimum_on_the_way_is_reported(monkeypatch, measured):
     def residuals(space, data, starts=1):
         return Residuals(lambda u, lane, point: ([1.5 * (u[0] * u[0] - 1.0), 0.3 * (u[0] - 1.0)], None), 1)
 
-    monkeypatch.setattr(module, "residuals", residuals)
+    monkeypatch.setattr(refits, "residuals", residuals)
     worse = least_squares(lambda u: [1.5 * (u[0] ** 2 - 1.0), 0.3 * (u[0] - 1.0)], [-1.0], xtol=1e-15)
     result.unknowns, result.information = worse.x, worse.jac.T @ worse.jac
     found = profile(result)
     np.testing.assert_allclose(found.better["x"], 1.0, atol=1e-6)
     assert abs(found.better_chi2) < 1e-10
     assert "better optimum" in found.notes[0]
-
-
-@pytest.fixture(scope="module")
-def small_fit():
-    """Three free parameters, 21 geometries: weak enough to be asymmetric, small enough for SciPy."""
-    dataset = pbrdf.open_experiment("pearl-white")
-    tilted = np.flatnonzero((dataset["group"].values == 1) & (np.arange(63) % 2 == 0))
-    fix = {"sigma": 0.038, "k": 2.6395, "b": 2.4167}
-    return pbrdf.fit(dataset.isel(geometry=tilted), fix=fix, starts=16)
 
 
 def test_ends_on_the_model_are_where_scipys_profile_crosses_the_threshold(small_fit):
@@ -272,16 +157,6 @@ def test_ends_on_the_model_are_where_scipys_profile_crosses_the_threshold(small_
             np.testing.assert_allclose(2.0 * peer.cost - lowest, 3.8415, atol=4e-3)
 
 
-def test_contour_on_the_model_touches_its_profile_intervals(small_fit):
-    """The lowest χ² along one parameter of the grid is that parameter's profile."""
-    found = contour(small_fit, "t", "n", points=41)
-    curve = profile(small_fit, ["t"], level=0.99).curves.sel(parameter="t")
-    shadow = np.interp(curve["value"], found.grid["t"], found.grid["chi2_rise"].min("n"))
-    near = curve["chi2_rise"].values < 4.0
-    np.testing.assert_allclose(shadow[near], curve["chi2_rise"].values[near], atol=0.15)
-    assert found.notes == []
-
-
 def test_intervals_reach_along_a_branch_that_other_parameters_find(monkeypatch, measured):
     """y = x², x pulled to −0.3, five times harder from the left: y > 0 is cheaper with x > 0, beyond y = 0.
 
@@ -296,7 +171,7 @@ def test_intervals_reach_along_a_branch_that_other_parameters_find(monkeypatch, 
     def function(u, lane, point):
         return [10.0 * (u[1] - u[0] * u[0]), pull(u[0], dr.tanh)], None
 
-    monkeypatch.setattr(module, "residuals", lambda space, data, starts=1: Residuals(function, 1))
+    monkeypatch.setattr(refits, "residuals", lambda space, data, starts=1: Residuals(function, 1))
     result.unknowns = np.array([-0.3, 0.09])
     J = np.array([[6.0, 10.0], [1.2, 0.0]])
     result.information = J.T @ J
@@ -321,9 +196,6 @@ def test_intervals_reach_along_a_branch_that_other_parameters_find(monkeypatch, 
         (lambda r: profile(r, []), "no parameter was named"),
         (lambda r: profile(r, level=1.0), "level=1"),
         (lambda r: profile(r, points=2), "points=2"),
-        (lambda r: contour(r, "n", "n"), "two different parameters"),
-        (lambda r: contour(r, "n", "q"), "'q' is not a free parameter"),
-        (lambda r: contour(r, "n", "t", levels=()), "at least one level"),
     ],
 )
 def test_errors_say_what_to_do(small_fit, call, message):

@@ -23,7 +23,7 @@ import numpy as np
 
 from pbrdf.errors import FitError
 from pbrdf.inversion.optimum import Optimum
-from pbrdf.inversion.profile import Optima
+from pbrdf.inversion.refits import Optima
 from pbrdf.inversion.statistics import covariance, prior_spread
 
 if TYPE_CHECKING:

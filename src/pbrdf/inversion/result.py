@@ -12,13 +12,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pbrdf.inversion.bootstrap import Bootstrap, bootstrap
+from pbrdf.inversion.contour import Contour, contour
 from pbrdf.inversion.erroranalysis import ErrorAnalysis, error_analysis
 from pbrdf.inversion.estimates import DistinctOptimum
 from pbrdf.inversion.holdout import HoldOut, Prediction
 from pbrdf.inversion.identifiability import Identifiability, identifiability
 from pbrdf.inversion.optimum import Optimum
 from pbrdf.inversion.plausibility import Finding, plausibility
-from pbrdf.inversion.profile import Contour, Profile, contour, profile
+from pbrdf.inversion.profile import Profile, profile
 from pbrdf.inversion.strategy import Stage
 from pbrdf.presentation import presenter_of
 
@@ -169,7 +170,7 @@ class FitResult(Optimum):
         return profile(self, names, **options)
 
     def contour(self, a: str, b: str, **options: Any) -> Contour:
-        """Joint region of two parameters, see :func:`pbrdf.inversion.profile.contour`."""
+        """Joint region of two parameters, see :func:`pbrdf.inversion.contour.contour`."""
         return contour(self, a, b, **options)
 
     def bootstrap(self, count: int = 200, **options: Any) -> Bootstrap:

@@ -12,11 +12,12 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from pbrdf.inversion.bootstrap import Bootstrap
+    from pbrdf.inversion.contour import Contour
     from pbrdf.inversion.crossvalidation import CrossValidation
     from pbrdf.inversion.erroranalysis import ErrorAnalysis
     from pbrdf.inversion.identifiability import Identifiability
     from pbrdf.inversion.plausibility import Finding
-    from pbrdf.inversion.profile import Contour, Profile
+    from pbrdf.inversion.profile import Profile
     from pbrdf.inversion.result import FitResult
 
 __all__ = ["Checks", "run_checks"]

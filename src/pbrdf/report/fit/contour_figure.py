@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from pbrdf.inversion.contour import Contour
     from pbrdf.inversion.estimates import Estimate
-    from pbrdf.inversion.profile import Contour
     from pbrdf.report.fit.subject import Report
 
 __all__ = ["contour_figure"]
