@@ -135,13 +135,14 @@ def measure(
     """
     import pbrdf
     from pbrdf.data.paints import PAINTS, WAVELENGTH
+    from pbrdf.files.atomic import require_new_folder
     from pbrdf.instruments.goniometer.source import AngleErrors, Source
     from pbrdf.instruments.virtual.experiment import VirtualExperiment
-    from pbrdf.instruments.virtual.measurement_folder import require_new, write_measurement
+    from pbrdf.instruments.virtual.measurement_folder import write_measurement
 
     if wavelength is not None and not 0.0 < wavelength < math.inf:
         raise PbrdfError(f"--wavelength {wavelength:g}: give a wavelength above 0 in nm")
-    require_new(output)
+    require_new_folder(output)
     if backend is not None:
         pbrdf.set_backend(backend)
     taken = open_instrument(instrument)

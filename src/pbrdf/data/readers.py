@@ -15,9 +15,9 @@ from pbrdf.data.formats.merl import read_merl
 from pbrdf.data.formats.netcdf import read_netcdf, write_netcdf
 from pbrdf.data.formats.pbsdf import read_pbsdf
 from pbrdf.data.formats.scatmech import has_scatmech_columns, read_scatmech
-from pbrdf.data.formats.storage import read_lines
 from pbrdf.data.formats.zarr_folder import read_zarr, write_zarr
 from pbrdf.errors import DataError
+from pbrdf.files.text import read_lines
 
 __all__ = ["FORMATS", "read", "write"]
 

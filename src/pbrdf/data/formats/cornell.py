@@ -16,10 +16,10 @@ import xarray as xr
 
 from pbrdf.data.build import assemble
 from pbrdf.data.conventions import azimuth_forward_pi_to_zero
-from pbrdf.data.formats.storage import read_lines
 from pbrdf.data.select import match_wavelengths
 from pbrdf.data.validate import validate
 from pbrdf.errors import DataError
+from pbrdf.files.text import read_lines
 
 __all__ = ["read_cornell"]
 

@@ -63,6 +63,8 @@ from numpy.typing import NDArray
 from pbrdf.data import conventions
 from pbrdf.data.build import assemble, group_labels
 from pbrdf.data.covariance import derived_variance, square
+from pbrdf.data.degrees import exact_degrees
+from pbrdf.data.formats.attributes import decode_attribute, encode_attribute, plain_attributes
 from pbrdf.data.formats.csv_columns import (
     ANGLE_COLUMNS,
     CHANNELS,
@@ -70,14 +72,6 @@ from pbrdf.data.formats.csv_columns import (
     ELEMENTS,
     Column,
     resolve_columns,
-)
-from pbrdf.data.formats.storage import (
-    atomic_target,
-    decode_attribute,
-    encode_attribute,
-    exact_degrees,
-    plain_attributes,
-    read_lines,
 )
 from pbrdf.data.schema import (
     ATTRIBUTE_NAME,
@@ -91,6 +85,8 @@ from pbrdf.data.schema import (
 )
 from pbrdf.data.validate import check, validate
 from pbrdf.errors import DataError
+from pbrdf.files.atomic import atomic_file
+from pbrdf.files.text import read_lines
 from pbrdf.optics.stokes import STOKES
 
 __all__ = ["header_names", "read_csv", "write_csv"]
@@ -530,7 +526,7 @@ def write_csv(ds: xr.Dataset, path: str | Path) -> None:
         elif name != "stokes_convention":
             header[name] = encode_attribute(name, value)
     columns = dict(_text_columns(ds))
-    with atomic_target(path) as target, target.open("x", encoding="utf-8", newline="") as file:
+    with atomic_file(path) as target, target.open("x", encoding="utf-8", newline="") as file:
         for name in sorted(header, key=lambda name: name != "quantity"):
             file.write(f"# {name}: {header[name]}\n")
         writer = csv.writer(file, lineterminator="\n")

@@ -22,11 +22,11 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from pbrdf.data.build import assemble
-from pbrdf.data.formats.storage import atomic_target
 from pbrdf.data.formats.thinning import thinning, thinning_in_words
 from pbrdf.data.schema import NATURAL_LIGHT
 from pbrdf.data.validate import validate
 from pbrdf.errors import DataError
+from pbrdf.files.atomic import atomic_file
 from pbrdf.optics.half_difference import directions, half_difference
 
 __all__ = ["COLOURS", "SHAPE", "cell_centres", "look_up", "read_merl", "read_planes", "write_planes"]
@@ -118,7 +118,7 @@ def write_planes(planes: ArrayLike, path: str | Path) -> None:
     if values.shape != (len(COLOURS), *SHAPE):
         raise DataError(f"{path}: planes of the shape {values.shape}; {(len(COLOURS), *SHAPE)} is needed")
     raw = values / _SCALES[:, np.newaxis, np.newaxis, np.newaxis]
-    with atomic_target(path) as beside, beside.open("wb") as file:
+    with atomic_file(path) as beside, beside.open("wb") as file:
         file.write(_HEADER.pack(*SHAPE))
         np.where(np.isnan(raw), _INVALID, raw).astype("<f8").tofile(file)
 

@@ -7,9 +7,9 @@ from typing import Final
 
 import xarray as xr
 
-from pbrdf.data.formats.storage import atomic_target
 from pbrdf.data.formats.stored import from_stored, to_stored
 from pbrdf.errors import DataError
+from pbrdf.files.atomic import atomic_file
 
 __all__ = ["read_netcdf", "write_netcdf"]
 
@@ -61,5 +61,5 @@ def write_netcdf(ds: xr.Dataset, path: str | Path) -> None:
         If `ds` does not follow the schema or the file cannot be written.
     """
     stored = to_stored(ds)
-    with atomic_target(Path(path)) as target:
+    with atomic_file(Path(path)) as target:
         stored.to_netcdf(target, engine=_ENGINE, format="NETCDF4")

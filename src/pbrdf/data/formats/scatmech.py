@@ -20,10 +20,10 @@ import xarray as xr
 
 from pbrdf.data.build import assemble
 from pbrdf.data.conventions import mueller_from_scatmech, mueller_xyxy_to_sp
-from pbrdf.data.formats.storage import read_lines
 from pbrdf.data.select import match_wavelengths
 from pbrdf.data.validate import validate
 from pbrdf.errors import DataError
+from pbrdf.files.text import read_lines
 
 __all__ = ["has_scatmech_columns", "read_scatmech"]
 

@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrdf.data.formats.storage import atomic_target
 from pbrdf.errors import DataError
+from pbrdf.files.atomic import atomic_file
 
 __all__ = ["read_tensors", "write_tensors"]
 
@@ -106,7 +106,7 @@ def write_tensors(arrays: Mapping[str, NDArray[Any]], path: Path) -> None:
         header.append(struct.pack("<H", len(names[name])) + names[name])
         header.append(struct.pack(f"<HBQ{array.ndim}Q", array.ndim, kind, offset, *array.shape))
         offset += array.nbytes
-    with atomic_target(path) as beside, beside.open("wb") as file:
+    with atomic_file(path) as beside, beside.open("wb") as file:
         file.write(b"".join(header))
         for name, array in stored.items():
             file.seek(starts[name])

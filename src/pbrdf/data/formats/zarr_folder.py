@@ -10,9 +10,9 @@ from pathlib import Path
 
 import xarray as xr
 
-from pbrdf.data.formats.storage import atomic_folder
 from pbrdf.data.formats.stored import from_stored, to_stored
 from pbrdf.errors import DataError
+from pbrdf.files.atomic import atomic_folder
 
 __all__ = ["read_zarr", "require_zarr", "write_zarr"]
 

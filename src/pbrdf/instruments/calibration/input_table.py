@@ -28,8 +28,9 @@ from pathlib import Path
 
 import numpy as np
 
-from pbrdf.data.formats.storage import atomic_target, read_lines
 from pbrdf.errors import DataError
+from pbrdf.files.atomic import atomic_file
+from pbrdf.files.text import read_lines
 from pbrdf.instruments.frames.frames import named
 from pbrdf.instruments.series_rows import series_rows
 from pbrdf.optics.stokes import STOKES
@@ -142,7 +143,7 @@ def read_input_table(path: str | Path) -> InputTable:
 def write_input_table(table: InputTable, path: str | Path) -> None:
     """Write the Stokes vectors of a table as :func:`read_input_table` reads them; raises DataError if it cannot."""
     path = Path(path)
-    with atomic_target(path) as target, target.open("x", encoding="utf-8", newline="") as file:
+    with atomic_file(path) as target, target.open("x", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(["series", *STOKES])
         writer.writerows(

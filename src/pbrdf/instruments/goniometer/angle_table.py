@@ -30,8 +30,10 @@ from numpy.typing import ArrayLike
 
 from pbrdf.data.build import group_labels
 from pbrdf.data.conventions import azimuth_forward_pi_to_zero
-from pbrdf.data.formats.storage import atomic_target, exact_degrees, read_lines
+from pbrdf.data.degrees import exact_degrees
 from pbrdf.errors import DataError
+from pbrdf.files.atomic import atomic_file
+from pbrdf.files.text import read_lines
 from pbrdf.instruments.frames.frames import named
 from pbrdf.instruments.series_rows import series_rows
 
@@ -256,7 +258,7 @@ def write_angles(table: AngleTable, path: str | Path) -> None:
         elif field == "wavelength":
             field = "wavelength_nm"
         columns[field] = [_cell(value) for value in values.tolist()]
-    with atomic_target(path) as target, target.open("x", encoding="utf-8", newline="") as file:
+    with atomic_file(path) as target, target.open("x", encoding="utf-8", newline="") as file:
         file.write("# azimuth: forward=0\n")
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(columns)

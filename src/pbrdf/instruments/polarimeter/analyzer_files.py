@@ -8,8 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from pbrdf.data.formats.storage import atomic_target, read_lines
 from pbrdf.errors import DataError
+from pbrdf.files.atomic import atomic_file
+from pbrdf.files.text import read_lines
 from pbrdf.instruments.polarimeter.polarimeter import Polarimeter, measured
 from pbrdf.optics.stokes import STOKES
 
@@ -66,7 +67,7 @@ def write_analyzer(polarimeter: Polarimeter, path: str | Path) -> None:
             {"state": list(polarimeter.states), "stokes": list(STOKES)},
             {"title": "analyser vectors W, intensity = W·(I, Q, U, V); x towards y, V > 0 left circular"},
         )
-        with atomic_target(path) as target:
+        with atomic_file(path) as target:
             stored.to_netcdf(target, engine="h5netcdf", format="NETCDF4")
     elif path.suffix.lower() == ".csv" and not polarimeter.is_map:
         text = io.StringIO()
@@ -75,7 +76,7 @@ def write_analyzer(polarimeter: Polarimeter, path: str | Path) -> None:
         writer.writerows(
             [n, *map(repr, w)] for n, w in zip(polarimeter.states, polarimeter.analyzer.tolist(), strict=True)
         )
-        with atomic_target(path) as target:
+        with atomic_file(path) as target:
             target.write_text(text.getvalue(), encoding="utf-8")
     else:
         kind = "a map of analyser vectors" if polarimeter.is_map else "analyser vectors"

@@ -124,7 +124,7 @@ def read_band(path: str | Path) -> Band:
     DataError
         If the file cannot be read or does not hold that; names the file and the line.
     """
-    from pbrdf.data.formats.storage import read_lines
+    from pbrdf.files.text import read_lines
 
     path = Path(path)
     rows = [

@@ -21,15 +21,14 @@ from __future__ import annotations
 
 import csv
 import math
-import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from pbrdf.data.formats.storage import read_lines
 from pbrdf.errors import DataError
+from pbrdf.files.text import read_lines, read_toml
 from pbrdf.instruments.frames.pictures import SUFFIXES, open_pictures
 from pbrdf.instruments.reduction.regions import Ellipse, LabelRegion, Polygon, Rectangle, Region
 
@@ -112,12 +111,8 @@ def read_regions(path: str | Path) -> dict[str, Region]:
 
 
 def _from_toml(path: Path) -> dict[str, Region]:
-    try:
-        content = tomllib.loads("\n".join(read_lines(path)))
-    except tomllib.TOMLDecodeError as error:
-        raise DataError(f"{path}: not a TOML file: {error}") from error
     regions: dict[str, Region] = {}
-    for name, table in content.items():
+    for name, table in read_toml(path).items():
         try:
             regions[name] = _from_table(table, path.parent)
         except DataError as error:

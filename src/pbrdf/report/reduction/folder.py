@@ -12,6 +12,7 @@ import numpy as np
 import pbrdf
 from pbrdf.data.readers import write
 from pbrdf.errors import DataError
+from pbrdf.files.atomic import atomic_folder
 from pbrdf.instruments.frames.frames import Frames
 from pbrdf.instruments.goniometer.angle_table import AngleTable
 from pbrdf.instruments.polarimeter.instrument import Instrument
@@ -19,7 +20,6 @@ from pbrdf.instruments.reduction.regions import Rectangle, Region, RegionAverage
 from pbrdf.instruments.reduction.series import RegionCollector, datasets_of_averages, require_same_series
 from pbrdf.instruments.reduction.stokes_maps import MapWriter, pixel_maps
 from pbrdf.instruments.reduction.streaming import DEFAULT_MEMORY, Block, reduced_blocks
-from pbrdf.report.fit.folder import complete_folder
 from pbrdf.report.reduction.gallery import Gallery, safe_name
 from pbrdf.report.reduction.picture_sums import BlockSums
 from pbrdf.report.reduction.summary import write_averages
@@ -112,7 +112,7 @@ def write_reduction(
     if wanted.angles is not None:
         require_same_series(frames.names, wanted.angles)
     names: list[str] = []
-    with complete_folder(directory) as temporary:
+    with atomic_folder(directory, fill=True) as temporary:
         gallery = Gallery(frames, temporary, name, wanted.regions) if wanted.pictures else None
         with ExitStack() as stack:
             maps: MapWriter | None = None
