@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from pbrdf.cli.reading import Reading, with_reading_options
+from pbrdf.cli.reading import WRITTEN, Reading, with_reading_options
 from pbrdf.cli.values import require_folder_of
 
 __all__ = ["check", "convert"]
@@ -39,7 +39,7 @@ def check(
 @with_reading_options
 def convert(
     file: Annotated[str, typer.Argument(metavar="IN", help="File of measured data, or a bundled paint.")],
-    output: Annotated[Path, typer.Argument(metavar="OUT", help="New file: .csv, .nc or .zarr.")],
+    output: Annotated[Path, typer.Argument(metavar="OUT", help=f"New file: {WRITTEN}.")],
     *,
     reading: Reading,
 ) -> None:

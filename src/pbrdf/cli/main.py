@@ -25,6 +25,7 @@ from pbrdf.cli.measure import measure
 from pbrdf.cli.plan import plan
 from pbrdf.cli.plot import plot
 from pbrdf.cli.polarimeter import polarimeter
+from pbrdf.cli.reading import ReadingCommand
 from pbrdf.cli.reduce import reduce
 from pbrdf.cli.render import render
 from pbrdf.cli.reproduce import reproduce
@@ -83,19 +84,19 @@ def options(
     """
 
 
-app.command()(fit)
+app.command(cls=ReadingCommand)(fit)
 app.command()(simulate)
 app.command()(calibrate)
 app.command()(polarimeter)
 app.command()(reduce)
-app.command()(plot)
+app.command(cls=ReadingCommand)(plot)
 app.command()(plan)
 app.command()(measure)
 app.command()(render)
 app.command()(reproduce)
 app.command()(export)
-app.command()(check)
-app.command()(convert)
+app.command(cls=ReadingCommand)(check)
+app.command(cls=ReadingCommand)(convert)
 app.command()(paints)
 app.command()(models)
 app.command()(doctor)

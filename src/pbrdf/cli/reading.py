@@ -5,13 +5,17 @@ from __future__ import annotations
 import functools
 import inspect
 import re
-from collections.abc import Callable
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from typer.core import TyperCommand
 
+from pbrdf.cli.console import warn
 from pbrdf.cli.values import number, pairs
 from pbrdf.errors import DataError, PbrdfError
 
@@ -19,13 +23,16 @@ if TYPE_CHECKING:
     import numpy as np
     import xarray as xr
 
-__all__ = ["Reading", "with_reading_options"]
+__all__ = ["WRITTEN", "Reading", "ReadingCommand", "with_reading_options"]
 
 _PANEL = "Reading the file"
 _SELECTABLE = ("group", "theta_i", "theta_r", "phi", "wavelength")
 #: Half the width within which a value that was asked for meets a measured one, degrees and nm.
 _TOLERANCE = {"wavelength": 0.5}
 _ANGLE_TOLERANCE = 0.05
+#: In help texts, what :class:`ReadingCommand` puts the names of the formats in place of, and the extensions of those
+#: that can be written.
+_FORMATS, WRITTEN = "FORMATS", "WRITTEN"
 
 
 @dataclass(frozen=True)
@@ -88,14 +95,16 @@ class Reading:
                 options[name] = pairs(options[name], f"--{name}", example)
         if Path(source).exists():
             try:
-                dataset = read(source, **options)
+                with _warnings_in_lines():
+                    dataset = read(source, **options)
             except DataError as error:
                 raise DataError(_as_on_the_command_line(str(error))) from error
         elif source in PAINTS:
             if options:
                 given = ", ".join("--" + name.replace("_", "-") for name in options)
                 raise DataError(f"{source} is a bundled data set and needs no {given}: leave it out")
-            dataset = open_experiment(source)
+            with _warnings_in_lines():
+                dataset = open_experiment(source)
         else:
             names = f", and no bundled paint has that name; those are {', '.join(PAINTS)}"
             raise DataError(f"{source}: there is no such file{'' if Path(source).suffix else names}")
@@ -108,6 +117,24 @@ class Reading:
         if self.wavelength:
             selections.append(("wavelength", ",".join(f"{w:g}" for w in self.wavelength)))
         return selections
+
+
+@contextmanager
+def _warnings_in_lines() -> Iterator[None]:
+    """Show what is wrong with a reader of an installed package as one line."""
+    from pbrdf.data.readers import ReaderWarning
+
+    with warnings.catch_warnings():
+        show = warnings.showwarning
+
+        def show_one_line(message: Warning | str, category: type[Warning], *rest: Any, **more: Any) -> None:
+            if issubclass(category, ReaderWarning):
+                warn(str(message))
+            else:
+                show(message, category, *rest, **more)
+
+        warnings.showwarning = show_one_line
+        yield
 
 
 def _as_on_the_command_line(message: str) -> str:
@@ -193,7 +220,7 @@ _OPTIONS: dict[str, tuple[Any, Any]] = {
     "format": (
         _option(
             str | None,
-            "csv, netcdf, zarr, scatmech, cornell, pbsdf or merl; found out by itself if not given.",
+            f"{_FORMATS}; found out by itself if not given.",
         ),
         None,
     ),
@@ -230,6 +257,21 @@ _OPTIONS: dict[str, tuple[Any, Any]] = {
         None,
     ),
 }
+
+
+class ReadingCommand(TyperCommand):
+    """A command with the options of :class:`Reading`; its help names the formats that are known when it is shown."""
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        from pbrdf.data.readers import format_names, written_extensions
+
+        for parameter in self.params:
+            help = getattr(parameter, "help", None) or ""
+            for placeholder, names in ((_FORMATS, format_names), (WRITTEN, written_extensions)):
+                if placeholder in help:
+                    *first, last = names()
+                    parameter.help = help.replace(placeholder, f"{', '.join(first)} or {last}")  # type: ignore[attr-defined]
+        super().format_help(ctx, formatter)
 
 
 def with_reading_options(command: Callable[..., None]) -> Callable[..., None]:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pbrdf.data.schema import COVARIANCE
-from pbrdf.data.validate import validate
+from pbrdf.data.validation import validate
 from pbrdf.errors import FitError
 from pbrdf.inversion.clusters import cluster
 from pbrdf.inversion.holdout import HoldOut, Prediction, prediction_errors

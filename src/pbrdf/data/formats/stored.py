@@ -28,7 +28,7 @@ from pbrdf.data.schema import (
     std_name,
     variable_units,
 )
-from pbrdf.data.validate import validate
+from pbrdf.data.validation import validate
 from pbrdf.errors import DataError
 
 __all__ = ["from_stored", "to_stored"]

@@ -19,14 +19,20 @@ from numpy.typing import NDArray
 
 from pbrdf.errors import DataError
 from pbrdf.files.atomic import atomic_file
+from pbrdf.files.text import first_bytes
 
-__all__ = ["read_tensors", "write_tensors"]
+__all__ = ["is_tensor_file", "read_tensors", "write_tensors"]
 
 _MAGIC = b"tensor_file\0"
 _HEADER = struct.Struct("<12s2BI")
 #: The enumeration of Mitsuba's ``Struct::Type``, from 1.
 _TYPES = ("u1", "i1", "<u2", "<i2", "<u4", "<i4", "<u8", "<i8", "<f2", "<f4", "<f8")
 _ALIGNMENT = 8
+
+
+def is_tensor_file(path: Path) -> bool:
+    """Whether a file begins as a tensor file."""
+    return first_bytes(path, len(_MAGIC)) == _MAGIC
 
 
 def read_tensors(path: Path) -> dict[str, NDArray[Any]]:
