@@ -261,6 +261,8 @@ def write_table(
     with atomic_file(path) as target, target.open("x", encoding="utf-8", newline="") as file:
         for key, value in (statements or {}).items():
             file.write(f"# {key}: {value}\n")
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(names)
-        writer.writerows(rows)
+        plain = csv.writer(file, lineterminator="\n")
+        quoted = csv.writer(file, lineterminator="\n", quoting=csv.QUOTE_ALL)
+        for cells in map(list, (names, *rows)):
+            # A row that began with # would be read as a comment.
+            (quoted if cells and _is_comment(str(cells[0])) else plain).writerow(cells)
