@@ -11,7 +11,7 @@ import functools
 import importlib
 import importlib.metadata
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -150,7 +150,10 @@ def write(ds: xr.Dataset, path: str | Path) -> None:
     extension = path.suffix.lower()
     for reader in _readers():
         if reader.write is not None and extension in reader.written:
-            reader.write(ds, path)
+            if reader.name in _OWN:
+                reader.write(ds, path)
+            else:
+                _write_checked(reader.name, reader.write, ds, path)
             return
     raise DataError(
         f"{path}: the extension {path.suffix!r} cannot be written; use {' or '.join(written_extensions())}"
@@ -182,9 +185,10 @@ def _of_name(path: Path, name: str) -> Reader:
 
 
 def _of_content(path: Path) -> Reader:
-    """The reader of a file: first those of its extension are asked, then all others, whether they know its content.
+    """The reader of a file.
 
-    Where none of its extension knows its content, one that does not look at the content has it.
+    That of its extension which knows its content; else one of its extension that does not look at the content; else any
+    that knows it; else one of its extension, which then says what is wrong.
     """
     readers = list(_readers())
     named = [reader for reader in readers if path.suffix.lower() in reader.extensions]
@@ -239,6 +243,21 @@ def _read_checked(reader: Reader, path: Path, options: Mapping[str, Any]) -> xr.
     return ds
 
 
+def _write_checked(
+    name: str, function: Callable[[xr.Dataset, Path], None], ds: xr.Dataset, path: Path
+) -> None:
+    """Let a writer of others write what is valid."""
+    from pbrdf.data.validation import validate
+
+    validate(ds)
+    try:
+        function(ds, path)
+    except PbrdfError:
+        raise
+    except Exception as error:
+        raise DataError(f"{path}: the writer {name!r} fails at it: {_told(error)}") from error
+
+
 @functools.cache
 def _installed() -> tuple[dict[str, Reader], dict[str, str]]:
     """Readers of installed packages by name, and by name what is wrong with those that cannot be used."""
@@ -252,7 +271,7 @@ def _installed() -> tuple[dict[str, Reader], dict[str, str]]:
             if reader.name != entry.name:
                 raise ValueError(f"{entry.value} is the reader {reader.name!r}")
             if reader.name in (*_OWN, *readers):
-                raise ValueError("another reader has this name")
+                raise ValueError("a format of pbrdf or of another package has this name")
         except Exception as error:
             package = f" of the package {entry.dist.name}" if entry.dist is not None else ""
             broken[entry.name] = (

@@ -43,7 +43,8 @@ class Reader:
     Raises
     ------
     DataError
-        If the name or an extension has another form, or there is neither an extension nor a `sniff`.
+        If the name or an extension has another form, there is neither an extension nor a `sniff`, or `written` is
+        given without `write`.
     """
 
     name: str
@@ -62,6 +63,12 @@ class Reader:
             if isinstance(values, str) or not all(re.fullmatch(r"\.\S+", value) for value in values):
                 raise DataError(f"reader {self.name!r}: {field} is {values!r}; give a tuple like ('.xyz',)")
             object.__setattr__(self, field, tuple(value.lower() for value in values))
+        if not self.extensions and self.sniff is None:
+            raise DataError(
+                f"reader {self.name!r}: give extensions, or a function sniff that knows its files"
+            )
+        if self.written and self.write is None:
+            raise DataError(f"reader {self.name!r}: written is given, but no function write")
         if self.write is not None and not self.written:
             object.__setattr__(self, "written", self.extensions)
 
