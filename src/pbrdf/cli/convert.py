@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from pbrdf.cli.options import data_argument, with_reading_options
+from pbrdf.cli.options import WRITTEN, data_argument, with_reading_options
 from pbrdf.cli.reading import Reading
 from pbrdf.cli.values import require_folder_of
 
@@ -17,7 +17,7 @@ __all__ = ["convert"]
 @with_reading_options
 def convert(
     file: Annotated[str, data_argument("IN")],
-    output: Annotated[Path, typer.Argument(metavar="OUT", help="New file: .csv, .nc or .zarr.")],
+    output: Annotated[Path, typer.Argument(metavar="OUT", help=f"New file: {WRITTEN}.")],
     *,
     reading: Reading,
 ) -> None:

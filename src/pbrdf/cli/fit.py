@@ -159,8 +159,9 @@ def fit(
 
     With your own: `pbrdf fit paint.csv --column I=f_r_per_sr --noise 3%,1% --fix n=1.5`
     """
+    from pbrdf.files.atomic import require_writable_folder
     from pbrdf.report.fit.checks import run_checks
-    from pbrdf.report.fit.folder import FIGURE_FORMATS, require_writable, write_report
+    from pbrdf.report.fit.folder import FIGURE_FORMATS, write_report
     from pbrdf.report.fit.subject import Report
 
     if figure_format not in FIGURE_FORMATS:
@@ -189,7 +190,7 @@ def fit(
     pairs_drawn = [_pair(text) for text in contour or ()]
     folders = _folders(files, output)
     for folder in folders:
-        require_writable(folder)
+        require_writable_folder(folder)
     if backend is not None:
         from pbrdf.backend import set_backend
 

@@ -22,6 +22,7 @@ from pbrdf.cli.export import export
 from pbrdf.cli.fit import fit
 from pbrdf.cli.lists import models, paints
 from pbrdf.cli.measure import measure
+from pbrdf.cli.options import ReadingCommand
 from pbrdf.cli.plan import plan
 from pbrdf.cli.plot import plot
 from pbrdf.cli.polarimeter import polarimeter
@@ -100,19 +101,19 @@ def options(
     _register(model)
 
 
-app.command()(fit)
+app.command(cls=ReadingCommand)(fit)
 app.command()(simulate)
 app.command()(calibrate)
 app.command()(polarimeter)
 app.command()(reduce)
-app.command()(plot)
+app.command(cls=ReadingCommand)(plot)
 app.command()(plan)
 app.command()(measure)
 app.command()(render)
 app.command()(reproduce)
 app.command()(export)
-app.command()(check)
-app.command()(convert)
+app.command(cls=ReadingCommand)(check)
+app.command(cls=ReadingCommand)(convert)
 app.command()(paints)
 app.command()(models)
 app.command()(doctor)

@@ -121,14 +121,15 @@ def measure(
     Of a plan: `pbrdf measure white --angles plan.csv -o planned && pbrdf fit planned/white.nc`
     """
     from pbrdf.backend import set_backend
+    from pbrdf.files.atomic import require_new_folder
     from pbrdf.instruments.goniometer.angle_errors import AngleErrors
     from pbrdf.instruments.goniometer.source import Source
     from pbrdf.instruments.virtual.experiment import VirtualExperiment
-    from pbrdf.instruments.virtual.measurement_folder import require_new, write_measurement
+    from pbrdf.instruments.virtual.measurement_folder import write_measurement
 
     if wavelength is not None and not 0.0 < wavelength < math.inf:
         raise PbrdfError(f"--wavelength {wavelength:g}: give a wavelength above 0 in nm")
-    require_new(output)
+    require_new_folder(output)
     if backend is not None:
         set_backend(backend)
     taken = open_instrument(instrument)

@@ -12,17 +12,20 @@ from collections.abc import Callable
 from typing import Annotated, Any
 
 import typer
+from typer.core import TyperCommand
 
 from pbrdf.cli.reading import SELECTABLE, Reading
 
 __all__ = [
     "CAMERA_POSITIONS",
+    "WRITTEN",
     "AsJson",
     "Backend",
     "CalibrationError",
     "DarkLevel",
     "NoProgressBar",
     "Patch",
+    "ReadingCommand",
     "WrittenWavelength",
     "angles_option",
     "data_argument",
@@ -42,6 +45,9 @@ __all__ = [
 _INSTRUMENTS = "paper, conservative, sony_imx250mzr, or an instrument's TOML file."
 _NAME_OR_FILE = "NAME|FILE"
 _READING_PANEL = "Reading the file"
+#: In help texts, what :class:`ReadingCommand` puts the names of the formats in place of, and the extensions of those
+#: that can be written.
+_FORMATS, WRITTEN = "FORMATS", "WRITTEN"
 
 #: Bistatic angles of the paper's camera positions as we take them, degrees.
 CAMERA_POSITIONS = "60,80,100"
@@ -177,7 +183,7 @@ _READING: dict[str, tuple[Any, Any]] = {
     "format": (
         _reading_option(
             str | None,
-            "csv, netcdf, zarr, scatmech, cornell, pbsdf or merl; found out by itself if not given.",
+            f"{_FORMATS}; found out by itself if not given.",
         ),
         None,
     ),
@@ -214,6 +220,21 @@ _READING: dict[str, tuple[Any, Any]] = {
         None,
     ),
 }
+
+
+class ReadingCommand(TyperCommand):
+    """A command with the options of :class:`Reading`; its help names the formats that are known when it is shown."""
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        from pbrdf.data.readers import format_names, written_extensions
+
+        for parameter in self.params:
+            help = getattr(parameter, "help", None) or ""
+            for placeholder, names in ((_FORMATS, format_names), (WRITTEN, written_extensions)):
+                if placeholder in help:
+                    *first, last = names()
+                    parameter.help = help.replace(placeholder, f"{', '.join(first)} or {last}")  # type: ignore[attr-defined]
+        super().format_help(ctx, formatter)
 
 
 def with_reading_options(command: Callable[..., None]) -> Callable[..., None]:

@@ -101,10 +101,10 @@ def reduce(
         raise PbrdfError(f"--maps {maps!r}: choose nc, zarr or none")
     if datasets not in ("csv", "nc"):
         raise PbrdfError(f"--datasets {datasets!r}: choose csv or nc")
+    from pbrdf.files.atomic import require_writable_folder
     from pbrdf.instruments.frames.frame_files import open_frames
     from pbrdf.instruments.frames.frames import ChosenSeries, Frames
     from pbrdf.instruments.goniometer.angle_table import read_angles
-    from pbrdf.report.fit.folder import require_writable
     from pbrdf.report.reduction.folder import Wanted, write_reduction
 
     if maps == "zarr":
@@ -132,7 +132,7 @@ def reduce(
         raise PbrdfError(
             f"--output {folder}: the frames are in this folder; choose another one for the results"
         )
-    require_writable(folder)
+    require_writable_folder(folder)
     wanted = Wanted(None if maps == "none" else maps, pictures, chosen, table, f".{datasets}")
     with progress_bar(f"Reducing {frames}", quiet) as progress:
         result = write_reduction(

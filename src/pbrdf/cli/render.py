@@ -90,7 +90,7 @@ def render(
     Two paints, seen through a polariser: `pbrdf render white pearl-white --scene plate --polarizer 90`
     """
     from pbrdf.cli.sources import open_model
-    from pbrdf.report.fit.folder import require_writable
+    from pbrdf.files.atomic import require_writable_folder
 
     sources = models or []
     own = not scene.endswith(".xml")
@@ -121,7 +121,7 @@ def render(
     if target.suffix.lower() == ".exr":
         require_folder_of(target)
     else:
-        require_writable(target)
+        require_writable_folder(target)
     paints = [open_model(source) for source in sources]
     for source, model in zip(sources, paints, strict=True):
         _warn_of_gain(source, model)
@@ -210,6 +210,7 @@ def _stage(
 
 def _write(picture: StokesPicture, target: Path, title: str, polarizers: list[float]) -> list[Path]:
     """Write the picture's files; returns them."""
+    from pbrdf.files.atomic import atomic_folder
     from pbrdf.rendering.picture import polarizer_name, write_exr
     from pbrdf.report.rendering.figure import channel_figure, polarizer_figure, stokes_figure
     from pbrdf.report.style import save_figure
@@ -219,16 +220,14 @@ def _write(picture: StokesPicture, target: Path, title: str, polarizers: list[fl
         figure = target.with_suffix(".png")
         save_figure(stokes_figure(picture, title), figure)
         return [target, figure]
-    target.mkdir(parents=True, exist_ok=True)
-    written = [target / "stokes.exr"]
-    write_exr(picture, written[0], polarizers)
     figures = {"stokes": stokes_figure(picture, title)}
     figures |= {name: channel_figure(picture, name, title) for name in ("s0", "dolp", "aolp")}
     figures |= {polarizer_name(angle): polarizer_figure(picture, angle, title) for angle in polarizers}
-    for name, drawn in figures.items():
-        written.append(target / f"{name}.png")
-        save_figure(drawn, written[-1])
-    return written
+    with atomic_folder(target, fill=True) as folder:
+        write_exr(picture, folder / "stokes.exr", polarizers)
+        for name, drawn in figures.items():
+            save_figure(drawn, folder / f"{name}.png")
+    return [target / name for name in ("stokes.exr", *(f"{name}.png" for name in figures))]
 
 
 def _tell(picture: StokesPicture) -> None:

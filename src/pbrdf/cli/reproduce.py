@@ -67,7 +67,7 @@ def reproduce(
     position 3. Writes a folder with a page (index.html), figures, tables, data sets and fitted models. The paper
     published no raw data: everything is simulated, and says so.
     """
-    from pbrdf.report.fit.folder import require_writable
+    from pbrdf.files.atomic import require_writable_folder
     from pbrdf.reproduction.experiment.measurement import Options
     from pbrdf.reproduction.run import reproduce as run
     from pbrdf.reproduction.run import write_reproduction
@@ -84,7 +84,7 @@ def reproduce(
         patch=patch,
         **_noise(noise),
     )
-    require_writable(output)
+    require_writable_folder(output)
     with stage_bar(quiet, "Reproducing the paper") as progress:
         reproduction = run(options, progress)
         written = write_reproduction(reproduction, output, progress)

@@ -22,7 +22,7 @@ from pbrdf.data.schema import (
     variable_dims,
     variable_units,
 )
-from pbrdf.data.validate import validate
+from pbrdf.data.validation import validate
 from pbrdf.errors import DataError
 from pbrdf.optics.stokes import STOKES
 

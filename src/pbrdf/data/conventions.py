@@ -13,6 +13,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pbrdf.optics.angles import within_half_turn
+
 __all__ = [
     "aolp_swap_sp",
     "apply_cosine_weight",
@@ -55,17 +57,13 @@ def azimuth_forward_pi_to_zero(phi: ArrayLike, half_turn: float = np.pi) -> NDAr
         φ − half turn, brought into (−half turn, half turn].
     """
     shifted = np.asarray(phi, dtype=np.float64) - half_turn
-    return _within_half_turn(shifted, half_turn)
+    return within_half_turn(shifted, half_turn)
 
 
 def azimuth_forward_zero_to_pi(phi: ArrayLike, half_turn: float = np.pi) -> NDArray[np.float64]:
     """Inverse of :func:`azimuth_forward_pi_to_zero`, with the same range."""
     shifted = np.asarray(phi, dtype=np.float64) + half_turn
-    return _within_half_turn(shifted, half_turn)
-
-
-def _within_half_turn(phi: NDArray[np.float64], half_turn: float) -> NDArray[np.float64]:
-    return phi - 2 * half_turn * np.ceil((phi - half_turn) / (2 * half_turn))
+    return within_half_turn(shifted, half_turn)
 
 
 def stokes_swap_sp(stokes: ArrayLike) -> NDArray[np.float64]:
@@ -85,7 +83,7 @@ def mueller_swap_sp(mueller: ArrayLike) -> NDArray[np.float64]:
 def aolp_swap_sp(aolp: ArrayLike) -> NDArray[np.float64]:
     """AoLP counted from s to AoLP counted from p, or back: 90° further, brought into (−π/2, π/2]."""
     angle = np.asarray(aolp, dtype=np.float64)
-    return _within_half_turn(angle + np.pi / 2, np.pi / 2)
+    return within_half_turn(angle + np.pi / 2, np.pi / 2)
 
 
 def stokes_flip_v(stokes: ArrayLike) -> NDArray[np.float64]:

@@ -1,53 +1,84 @@
-"""Reading and writing by file name."""
+"""Reading and writing by file name: the formats that are known, and how others join them.
+
+A format is a :class:`pbrdf.data.formats.declaration.Reader`. There are those of this package, those that installed
+packages declare in the entry-point group ``pbrdf.readers``, and those that :func:`register_reader` adds. Modules of
+formats are loaded when a file is read or written; their names alone, as a help text needs them, load nothing.
+"""
 
 from __future__ import annotations
 
-import inspect
-from collections.abc import Callable, Mapping
+import functools
+import importlib
+import importlib.metadata
+import warnings
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import xarray as xr
+from pbrdf.data.formats.declaration import Reader
+from pbrdf.errors import DataError, PbrdfError
 
-from pbrdf.data.formats.cornell import read_cornell
-from pbrdf.data.formats.csv_table import header_names, read_csv, write_csv
-from pbrdf.data.formats.merl import read_merl
-from pbrdf.data.formats.netcdf import read_netcdf, write_netcdf
-from pbrdf.data.formats.pbsdf import read_pbsdf
-from pbrdf.data.formats.scatmech import has_scatmech_columns, read_scatmech
-from pbrdf.data.formats.storage import read_lines
-from pbrdf.data.formats.zarr_folder import read_zarr, write_zarr
-from pbrdf.errors import DataError
+if TYPE_CHECKING:
+    import xarray as xr
 
-__all__ = ["FORMATS", "read", "write"]
+__all__ = [
+    "GROUP",
+    "ReaderWarning",
+    "format_names",
+    "read",
+    "register_reader",
+    "write",
+    "written_extensions",
+]
 
-#: Readers by format name.
-FORMATS: dict[str, Callable[..., xr.Dataset]] = {
-    "csv": read_csv,
-    "netcdf": read_netcdf,
-    "zarr": read_zarr,
-    "scatmech": read_scatmech,
-    "cornell": read_cornell,
-    "pbsdf": read_pbsdf,
-    "merl": read_merl,
+#: Entry points of this group are readers: the name is that of the format, the object a ``Reader``.
+GROUP = "pbrdf.readers"
+
+#: The modules of the formats of this package, each with its declaration, ``READER``.
+_OWN = {
+    "csv": "pbrdf.data.formats.csv_table.reading",
+    "netcdf": "pbrdf.data.formats.netcdf",
+    "zarr": "pbrdf.data.formats.zarr_folder",
+    "scatmech": "pbrdf.data.formats.scatmech",
+    "cornell": "pbrdf.data.formats.cornell",
+    "pbsdf": "pbrdf.data.formats.pbsdf",
+    "merl": "pbrdf.data.formats.merl",
 }
-_EXTENSIONS = {
-    ".csv": "csv",
-    ".tsv": "csv",
-    ".txt": "csv",
-    ".dat": "csv",
-    ".nc": "netcdf",
-    ".nc4": "netcdf",
-    ".zarr": "zarr",
-    ".brdf": "cornell",
-    ".pbsdf": "pbsdf",
-    ".binary": "merl",
-}
-_WRITERS: dict[str, Callable[[xr.Dataset, Path], None]] = {
-    ".csv": write_csv,
-    ".nc": write_netcdf,
-    ".zarr": write_zarr,
-}
+_registered: dict[str, Reader] = {}
+
+
+class ReaderWarning(UserWarning):
+    """A reader of an installed package cannot be used; the other formats can."""
+
+
+def register_reader(reader: Reader) -> None:
+    """Make a format known to :func:`read`, :func:`write` and the command line for as long as the program runs.
+
+    Parameters
+    ----------
+    reader
+        Its declaration. It goes before the readers of installed packages, and before one that was registered under the
+        same name.
+
+    Raises
+    ------
+    DataError
+        If a format of this package has its name.
+    """
+    if reader.name in _OWN:
+        raise DataError(f"reader {reader.name!r}: a format of pbrdf itself has this name; choose another")
+    _registered[reader.name] = reader
+
+
+def format_names() -> list[str]:
+    """Names of all formats."""
+    installed = (entry.name for entry in importlib.metadata.entry_points(group=GROUP))
+    return list(dict.fromkeys((*_OWN, *_registered, *installed)))
+
+
+def written_extensions() -> list[str]:
+    """Extensions of the files that :func:`write` writes."""
+    return list(dict.fromkeys(extension for reader in _readers() for extension in reader.written))
 
 
 def read(
@@ -60,12 +91,13 @@ def read(
     path
         The file; for Zarr the folder.
     column
-        For CSV: the file's column names by the names used here, see :func:`pbrdf.data.formats.csv_table.read_csv`.
+        For CSV: the file's column names by the names used here, see
+        :func:`pbrdf.data.formats.csv_table.reading.read_csv`.
     format
-        ``"csv"``, ``"netcdf"``, ``"zarr"``, ``"scatmech"``, ``"cornell"``, ``"pbsdf"`` or ``"merl"``; None finds it out
-        from the extension and, for text tables, the column names.
+        ``"csv"``, ``"netcdf"``, ``"zarr"``, ``"scatmech"``, ``"cornell"``, ``"pbsdf"``, ``"merl"`` or one that was
+        added (:func:`register_reader`); None finds it out from the extension and the content.
     **options
-        Options of the format's reader: for ``"csv"`` those of :func:`pbrdf.data.formats.csv_table.read_csv`
+        Options of the format's reader: for ``"csv"`` those of :func:`pbrdf.data.formats.csv_table.reading.read_csv`
         (`where`, `skip_invalid`, `quantity`, `azimuth`, `stokes`, `illumination`, `cosine_weighted`,
         `angles`); for ``"scatmech"``, ``"cornell"`` and ``"pbsdf"`` `wavelength` in nm, one or several; for
         ``"pbsdf"`` and ``"merl"`` `every`, see :func:`pbrdf.data.formats.pbsdf.read_pbsdf`.
@@ -83,36 +115,24 @@ def read(
     path = Path(path)
     if not path.exists():
         raise DataError(f"{path}: there is no such file")
-    if path.is_dir() and (format or _EXTENSIONS.get(path.suffix.lower())) != "zarr":
+    reader = _of_content(path) if format is None else _of_name(path, format)
+    if path.is_dir() and not reader.folder:
         raise DataError(f"{path}: this is a folder; name a file in it")
-    name = format if format is not None else _detect(path)
-    if name not in FORMATS:
-        raise DataError(f"{path}: the format {name!r} is not known; use one of {', '.join(FORMATS)}")
     if column is not None:
         options["column"] = column
-    reader = FORMATS[name]
-    known = [p.name for p in inspect.signature(reader).parameters.values() if p.kind is p.KEYWORD_ONLY]
     for option in options:
-        if option not in known:
-            choices = f"its options are {', '.join(known)}" if known else "it has no options"
-            raise DataError(f"{path}: the format {name} has no option {option!r}; {choices}")
-    return reader(path, **options)
-
-
-def _detect(path: Path) -> str:
-    name = _EXTENSIONS.get(path.suffix.lower())
-    if name is None:
-        raise DataError(
-            f"{path}: the extension {path.suffix!r} is not known; state the format, one of "
-            f"{', '.join(FORMATS)}"
-        )
-    if name == "csv" and has_scatmech_columns(header_names(read_lines(path))):
-        return "scatmech"
-    return name
+        if option not in reader.options:
+            choices = (
+                f"its options are {', '.join(reader.options)}" if reader.options else "it has no options"
+            )
+            raise DataError(f"{path}: the format {reader.name} has no option {option!r}; {choices}")
+    return reader.read(path, **options) if reader.name in _OWN else _read_checked(reader, path, options)
 
 
 def write(ds: xr.Dataset, path: str | Path) -> None:
-    """Write a data set as ``.csv``, ``.nc`` or ``.zarr``, by the extension; reading it gives back the same bits.
+    """Write a data set as ``.csv``, ``.nc``, ``.zarr`` or in a format that was added, by the extension.
+
+    Reading it gives back the same bits.
 
     Parameters
     ----------
@@ -127,9 +147,141 @@ def write(ds: xr.Dataset, path: str | Path) -> None:
         If `ds` does not follow the schema, the extension is not known, or the file cannot be written.
     """
     path = Path(path)
-    writer = _WRITERS.get(path.suffix.lower())
-    if writer is None:
+    extension = path.suffix.lower()
+    for reader in _readers():
+        if reader.write is not None and extension in reader.written:
+            if reader.name in _OWN:
+                reader.write(ds, path)
+            else:
+                _write_checked(reader.name, reader.write, ds, path)
+            return
+    raise DataError(
+        f"{path}: the extension {path.suffix!r} cannot be written; use {' or '.join(written_extensions())}"
+    )
+
+
+def _own(name: str) -> Reader:
+    return importlib.import_module(_OWN[name]).READER
+
+
+def _readers() -> Iterator[Reader]:
+    """All readers, in the order in which they are asked."""
+    yield from reversed(_registered.values())
+    yield from map(_own, _OWN)
+    yield from (reader for name, reader in _installed()[0].items() if name not in _registered)
+
+
+def _of_name(path: Path, name: str) -> Reader:
+    if name in _registered:
+        return _registered[name]
+    if name in _OWN:
+        return _own(name)
+    installed, broken = _installed()
+    if name in installed:
+        return installed[name]
+    if name in broken:
+        raise DataError(f"{path}: {broken[name]}")
+    raise DataError(f"{path}: the format {name!r} is not known; use one of {', '.join(format_names())}")
+
+
+def _of_content(path: Path) -> Reader:
+    """The reader of a file.
+
+    That of its extension which knows its content; else one of its extension that does not look at the content; else any
+    that knows it; else one of its extension, which then says what is wrong.
+    """
+    readers = list(_readers())
+    named = [reader for reader in readers if path.suffix.lower() in reader.extensions]
+    plain = [reader for reader in named if reader.sniff is None]
+    known = next((reader for reader in named if _sniffs(reader, path)), None)
+    if known is None and not plain:
+        known = next((reader for reader in readers if _sniffs(reader, path)), None)
+    found = [*([] if known is None else [known]), *plain, *named]
+    if path.is_dir():
+        found = [reader for reader in found if reader.folder]
+        if not found:
+            raise DataError(f"{path}: this is a folder; name a file in it")
+    if not found:
+        also = "".join(f"; {sentence}" for sentence in _installed()[1].values())
         raise DataError(
-            f"{path}: the extension {path.suffix!r} cannot be written; use {' or '.join(_WRITERS)}"
+            f"{path}: the extension {path.suffix!r} is not known; state the format, one of "
+            f"{', '.join(format_names())}{also}"
         )
-    writer(ds, path)
+    return found[0]
+
+
+def _sniffs(reader: Reader, path: Path) -> bool:
+    """Whether a reader knows the content of a path; one that fails at it does not, whoever wrote it."""
+    if reader.sniff is None or reader.folder != path.is_dir():
+        return False
+    try:
+        return bool(reader.sniff(path))
+    except Exception as error:
+        warnings.warn(
+            f"{path}: the reader {reader.name!r} fails to recognise it: {_told(error)}",
+            ReaderWarning,
+            stacklevel=5,
+        )
+        return False
+
+
+def _read_checked(reader: Reader, path: Path, options: Mapping[str, Any]) -> xr.Dataset:
+    """What a reader of others gives, checked: neither its mistakes nor its data get any further."""
+    import xarray as xr
+
+    from pbrdf.data.validation import validate
+
+    try:
+        ds = reader.read(path, **options)
+    except PbrdfError:
+        raise
+    except Exception as error:
+        raise DataError(f"{path}: the reader {reader.name!r} fails at it: {_told(error)}") from error
+    if not isinstance(ds, xr.Dataset):
+        raise DataError(f"{path}: the reader {reader.name!r} gives {type(ds).__name__}, not a data set")
+    validate(ds, origin=str(path))
+    return ds
+
+
+def _write_checked(
+    name: str, function: Callable[[xr.Dataset, Path], None], ds: xr.Dataset, path: Path
+) -> None:
+    """Let a writer of others write what is valid."""
+    from pbrdf.data.validation import validate
+
+    validate(ds)
+    try:
+        function(ds, path)
+    except PbrdfError:
+        raise
+    except Exception as error:
+        raise DataError(f"{path}: the writer {name!r} fails at it: {_told(error)}") from error
+
+
+@functools.cache
+def _installed() -> tuple[dict[str, Reader], dict[str, str]]:
+    """Readers of installed packages by name, and by name what is wrong with those that cannot be used."""
+    readers: dict[str, Reader] = {}
+    broken: dict[str, str] = {}
+    for entry in importlib.metadata.entry_points(group=GROUP):
+        try:
+            reader = entry.load()
+            if not isinstance(reader, Reader):
+                raise TypeError(f"{entry.value} is a {type(reader).__name__}, not a Reader")
+            if reader.name != entry.name:
+                raise ValueError(f"{entry.value} is the reader {reader.name!r}")
+            if reader.name in (*_OWN, *readers):
+                raise ValueError("a format of pbrdf or of another package has this name")
+        except Exception as error:
+            package = f" of the package {entry.dist.name}" if entry.dist is not None else ""
+            broken[entry.name] = (
+                f"the reader {entry.name!r}{package} cannot be loaded ({_told(error)}); repair or remove that package"
+            )
+            warnings.warn(broken[entry.name], ReaderWarning, stacklevel=5)
+        else:
+            readers[reader.name] = reader
+    return readers, broken
+
+
+def _told(error: Exception) -> str:
+    return " ".join(f"{type(error).__name__}: {error}".split())

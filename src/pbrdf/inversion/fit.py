@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pbrdf.data.schema import COVARIANCE
-from pbrdf.data.validate import validate
+from pbrdf.data.validation import validate
 from pbrdf.errors import FitError
 from pbrdf.inversion.comparison import compare, near_specular_tilt
 from pbrdf.inversion.estimates import distinct_optima, estimates_at

@@ -14,6 +14,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from pbrdf.errors import ModelError
+from pbrdf.files.atomic import atomic_file
 from pbrdf.models import evaluation
 from pbrdf.models.arrays import Matrix, drjit_to_numpy, is_drjit, is_symbolic
 from pbrdf.models.lobe import measured_lobe_width
@@ -271,10 +272,8 @@ class Model:
         """Return the model as JSON text and, if a path is given, write it there."""
         text = json.dumps(self.to_dict(), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
         if path is not None:
-            target = Path(path)
-            temporary = target.with_name(target.name + ".part")
-            temporary.write_text(text, encoding="utf-8")
-            temporary.replace(target)
+            with atomic_file(Path(path)) as target:
+                target.write_text(text, encoding="utf-8")
         return text
 
     def __eq__(self, other: object) -> bool:

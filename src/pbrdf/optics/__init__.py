@@ -1,7 +1,7 @@
 """Physics formulas over generic Dr.Jit floats, one family a file.
 
 Everything below works on any Dr.Jit floating-point type (float32 or float64, LLVM or CUDA, with or without
-derivatives), and knows nothing of NumPy but for the last four. Vectors are plain tuples of three floats, so that the
+derivatives), and knows nothing of NumPy but for the last five. Vectors are plain tuples of three floats, so that the
 same function is traced into a fit, an evaluation or a renderer's kernel.
 
 ====================  =====================================================================
@@ -20,5 +20,6 @@ same function is traced into a fit, an evaluation or a renderer's kernel.
 ``mueller``           physical realisability of Mueller matrices
 ``elements``          polarisers and retarders, in the frame of an instrument
 ``half_difference``   half and difference angles, tilt of the mirror facet
+``angles``            angles brought into their range
 ====================  =====================================================================
 """

@@ -9,6 +9,8 @@ about h, counted anticlockwise (seen from the tip of h) from the direction in wh
 
 So ``phi_d`` = 0 is the plane of incidence with i closer to the surface than o, exchanging i and o adds π, and
 −``phi_d`` is the mirror image. The azimuth of h is left out: the surfaces are isotropic. Angles are in radians.
+
+This is about tables, over NumPy arrays: unlike the model's formulas it is not traced into a kernel.
 """
 
 from __future__ import annotations
@@ -17,6 +19,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from pbrdf.optics.angles import within_half_turn
 
 __all__ = ["directions", "facet_tilt", "from_scattering_plane", "half_difference", "to_scattering_plane"]
 
@@ -36,10 +40,9 @@ def directions(theta_h: ArrayLike, theta_d: ArrayLike, phi_d: ArrayLike) -> tupl
     theta_i, theta_r, phi
         Zenith angles in [0, π]: above π/2 a direction lies below the surface.
     """
-    from pbrdf.data.conventions import azimuth_forward_pi_to_zero
-
     theta_i, azimuth_i, theta_r, azimuth_r = _spherical(theta_h, theta_d, phi_d)
-    return theta_i, theta_r, azimuth_forward_pi_to_zero(azimuth_r - azimuth_i)
+    # Both directions point away from the surface, so forward is where the azimuths differ by π.
+    return theta_i, theta_r, within_half_turn(azimuth_r - azimuth_i - np.pi)
 
 
 def half_difference(theta_i: ArrayLike, theta_r: ArrayLike, phi: ArrayLike) -> tuple[Array, Array, Array]:

@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from pbrdf.data.formats.storage import atomic_target
 from pbrdf.errors import DataError
+from pbrdf.files.atomic import atomic_file
 from pbrdf.optics.elements import diattenuator
 from pbrdf.optics.stokes import aolp, dolp
 
@@ -109,7 +109,7 @@ def write_exr(picture: StokesPicture, path: Path, polarizers: Sequence[float] = 
     header = bitmap.metadata()
     for name, value in {**picture.attrs, "convention": _CONVENTION}.items():
         header[name] = value
-    with atomic_target(path) as target:
+    with atomic_file(path) as target:
         try:
             bitmap.write(str(target), mi.Bitmap.FileFormat.OpenEXR)
         except RuntimeError as error:

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pbrdf.data.formats.storage import atomic_target
 from pbrdf.errors import DataError
+from pbrdf.files.atomic import atomic_file
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -168,5 +168,5 @@ def save_figure(figure: Figure, path: Path) -> None:
     }
     if kind not in options:
         raise DataError(f"{path}: figures are written as {', '.join('.' + k for k in options)}")
-    with styled(), atomic_target(path) as target:
+    with styled(), atomic_file(path) as target:
         figure.savefig(target, format=kind, **options[kind])

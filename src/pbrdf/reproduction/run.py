@@ -8,6 +8,7 @@ from pathlib import Path
 
 from pbrdf.data.paints import load_paint
 from pbrdf.data.readers import write
+from pbrdf.files.atomic import atomic_folder
 from pbrdf.reproduction.experiment.measurement import Options, measured_samples
 from pbrdf.reproduction.experiment.sample import Sample, invert
 from pbrdf.reproduction.paper import SIMULATED
@@ -66,7 +67,6 @@ def write_reproduction(
     DataError
         If the folder cannot be written.
     """
-    from pbrdf.report.fit.folder import complete_folder
     from pbrdf.report.style import save_figure
     from pbrdf.reproduction.figures.all import pictures
     from pbrdf.reproduction.page.page import page_text
@@ -74,7 +74,7 @@ def write_reproduction(
 
     settings = reproduction.options.in_words()
     rows = tables(reproduction.samples, reproduction.statements, reproduction.numbers)
-    with complete_folder(directory) as folder:
+    with atomic_folder(directory, fill=True) as folder:
         for name in ("figures", "tables", "data", "models"):
             (folder / name).mkdir()
         makers = pictures(reproduction.samples, reproduction.options.positions)

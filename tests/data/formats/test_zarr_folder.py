@@ -83,14 +83,13 @@ def test_an_interrupted_replacement_keeps_the_old_folder(tmp_path, ds, monkeypat
             raise OSError(5, "no")
         return replace(self, target)
 
-    from pbrdf.data.formats.storage import atomic_folder
+    from pbrdf.files.atomic import atomic_folder
 
     monkeypatch.setattr(Path, "replace", stubborn)
     with (
         pytest.raises(DataError, match=r"data\.zarr: cannot be written: no"),
         atomic_folder(tmp_path / "data.zarr") as target,
     ):
-        target.mkdir()
         (target / "new").write_text("")
     assert [path.name for path in tmp_path.iterdir()] == ["data.zarr"]
     assert read(tmp_path / "data.zarr").identical(ds)

@@ -99,12 +99,15 @@ def test_tables_from_files(tmp_path):
     np.testing.assert_array_equal(read_band(path).weights, tabulated_band([466, 476, 486], [0, 3, 0]).weights)
     for text, message in (
         ("wavelength,transmission\n1,2\n", "filter.csv: there is no column 'wavelength_nm'"),
-        ("wavelength_nm,transmission\n1,x\n", "filter.csv: line 2"),
+        (
+            "wavelength_nm,transmission\n1,x\n",
+            "filter.csv: line 2, column 'transmission': 'x' is not a number",
+        ),
         (
             "wavelength_nm,transmission\n2,1\n1,1\n",
             "filter.csv: band: the table needs two or more wavelengths, asc",
         ),
-        ("", "no column"),
+        ("", "no line of column names"),
     ):
         path.write_text(text, encoding="utf-8")
         with pytest.raises(DataError, match=message):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pbrdf.data.formats.csv_columns import COVARIANCES
+from pbrdf.data.formats.csv_table.columns import COVARIANCES
 from pbrdf.errors import DataError
 from pbrdf.instruments.frames.frames import ArrayFrames
 from pbrdf.instruments.goniometer.angle_table import AngleTable

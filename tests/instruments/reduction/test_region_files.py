@@ -87,9 +87,12 @@ def test_csv(tmp_path):
     ("text", "message"),
     [
         ("name,x,y\na,1,2", "its columns are name, x, y; give name, x0, x1, y0, y1"),
-        ("name,x0,x1,y0,y1\na,1,2,3", "line 2: give a name and four numbers"),
+        ("name,x0,x1,y0,y1\na,1,2,3", "line 2: 4 cells under 5 column names"),
         ("name,x0,x1,y0,y1\na,1,2,3,4\na,1,2,3,4", "line 3: 'a' stands there twice"),
         ("name,x0,x1,y0,y1\na,2,1,3,4", "line 2: rectangle 2:1,3:4"),
+        ("name,x0,x1,y0,y1\na,1,2,3,nan", "line 2: give a name and four finite numbers"),
+        ("name,x0,x1,y0,y1\na,1,2,3,x", "line 2, column 'y1': 'x' is not a number"),
+        ("name,x0,x1,y0,y1\n,1,2,3,4", "line 2, column 'name': the cell is empty"),
         ("name,x0,x1,y0,y1\n", "there is no region in it"),
     ],
 )

@@ -11,9 +11,7 @@ from pbrdf.errors import DataError
 from pbrdf.report.fit import folder as module
 from pbrdf.report.fit.folder import (
     comparison_file,
-    complete_folder,
     fit_record,
-    require_writable,
     write_report,
 )
 
@@ -95,35 +93,3 @@ def test_a_failure_leaves_nothing_behind(report, tmp_path, monkeypatch):
     with pytest.raises(DataError, match="fit: cannot be written: No space left"):
         write_report(report, tmp_path / "fit")
     assert list(tmp_path.iterdir()) == []
-
-
-def test_a_folder_is_tried_without_a_trace(tmp_path):
-    require_writable(tmp_path / "a" / "b" / "fit")
-    assert list(tmp_path.iterdir()) == []
-    (tmp_path / "file").write_text("")
-    with pytest.raises(DataError, match="there is a file of that name"):
-        require_writable(tmp_path / "file")
-    with pytest.raises(DataError, match="cannot be written"):
-        require_writable(tmp_path / "file" / "fit")
-
-
-def test_a_folder_that_is_there_is_filled_but_a_zarr_store_in_it_is_replaced_as_a_whole(tmp_path):
-    """Pieces of an old store among those of the new one would be read as data."""
-    for name, text in (
-        ("figures/mine.txt", "mine"),
-        ("figures/a.txt", "old"),
-        ("maps.zarr/c/9", "old piece"),
-    ):
-        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
-        (tmp_path / name).write_text(text)
-    with complete_folder(tmp_path) as folder:
-        for name in ("figures/a.txt", "maps.zarr/c/0", "summary.txt"):
-            (folder / name).parent.mkdir(parents=True, exist_ok=True)
-            (folder / name).write_text("new")
-    found = {str(p.relative_to(tmp_path)): p.read_text() for p in tmp_path.rglob("*") if p.is_file()}
-    assert found == {
-        "figures/mine.txt": "mine",
-        "figures/a.txt": "new",
-        "maps.zarr/c/0": "new",
-        "summary.txt": "new",
-    }

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import pbrdf
-from pbrdf.data.validate import validate
+from pbrdf.data.validation import validate
 from pbrdf.errors import DataError
 from pbrdf.instruments.goniometer.protocols import Protocol
 from pbrdf.reproduction.experiment.measurement import Options, measured_samples

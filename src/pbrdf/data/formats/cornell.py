@@ -16,12 +16,13 @@ import xarray as xr
 
 from pbrdf.data.build import assemble
 from pbrdf.data.conventions import azimuth_forward_pi_to_zero
-from pbrdf.data.formats.storage import read_lines
+from pbrdf.data.formats.declaration import Reader
 from pbrdf.data.select import match_wavelengths
-from pbrdf.data.validate import validate
+from pbrdf.data.validation import validate
 from pbrdf.errors import DataError
+from pbrdf.files.text import read_lines
 
-__all__ = ["read_cornell"]
+__all__ = ["READER", "read_cornell"]
 
 
 def read_cornell(path: str | Path, *, wavelength: float | Sequence[float] | None = None) -> xr.Dataset:
@@ -105,3 +106,6 @@ def _title(text: list[str]) -> str:
             break
         sentences.append(content.lstrip("# ").rstrip())
     return "; ".join(filter(None, sentences))
+
+
+READER = Reader("cornell", read_cornell, extensions=(".brdf",))

@@ -22,14 +22,25 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from pbrdf.data.build import assemble
-from pbrdf.data.formats.storage import atomic_target
+from pbrdf.data.formats.declaration import Reader
 from pbrdf.data.formats.thinning import thinning, thinning_in_words
 from pbrdf.data.schema import NATURAL_LIGHT
-from pbrdf.data.validate import validate
+from pbrdf.data.validation import validate
 from pbrdf.errors import DataError
+from pbrdf.files.atomic import atomic_file
+from pbrdf.files.text import first_bytes
 from pbrdf.optics.half_difference import directions, half_difference
 
-__all__ = ["COLOURS", "SHAPE", "cell_centres", "look_up", "read_merl", "read_planes", "write_planes"]
+__all__ = [
+    "COLOURS",
+    "READER",
+    "SHAPE",
+    "cell_centres",
+    "look_up",
+    "read_merl",
+    "read_planes",
+    "write_planes",
+]
 
 #: Cells of θ_h, θ_d and φ_d.
 SHAPE = (90, 90, 180)
@@ -118,7 +129,7 @@ def write_planes(planes: ArrayLike, path: str | Path) -> None:
     if values.shape != (len(COLOURS), *SHAPE):
         raise DataError(f"{path}: planes of the shape {values.shape}; {(len(COLOURS), *SHAPE)} is needed")
     raw = values / _SCALES[:, np.newaxis, np.newaxis, np.newaxis]
-    with atomic_target(path) as beside, beside.open("wb") as file:
+    with atomic_file(path) as beside, beside.open("wb") as file:
         file.write(_HEADER.pack(*SHAPE))
         np.where(np.isnan(raw), _INVALID, raw).astype("<f8").tofile(file)
 
@@ -174,3 +185,10 @@ def read_merl(path: str | Path, *, every: int | None = None) -> xr.Dataset:
     )
     validate(ds, origin=str(path))
     return ds
+
+
+def _begins_as_merl(path: Path) -> bool:
+    return first_bytes(path, _HEADER.size) == _HEADER.pack(*SHAPE)
+
+
+READER = Reader("merl", read_merl, extensions=(".binary",), sniff=_begins_as_merl)

@@ -7,13 +7,17 @@ from typing import Final
 
 import xarray as xr
 
-from pbrdf.data.formats.storage import atomic_target
+from pbrdf.data.formats.declaration import Reader
 from pbrdf.data.formats.stored import from_stored, to_stored
 from pbrdf.errors import DataError
+from pbrdf.files.atomic import atomic_file
+from pbrdf.files.text import first_bytes
 
-__all__ = ["read_netcdf", "write_netcdf"]
+__all__ = ["READER", "read_netcdf", "write_netcdf"]
 
 _ENGINE: Final = "h5netcdf"
+#: How HDF5 files begin, of which netCDF-4 is a kind.
+_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 
 def read_netcdf(path: str | Path) -> xr.Dataset:
@@ -61,5 +65,19 @@ def write_netcdf(ds: xr.Dataset, path: str | Path) -> None:
         If `ds` does not follow the schema or the file cannot be written.
     """
     stored = to_stored(ds)
-    with atomic_target(Path(path)) as target:
+    with atomic_file(Path(path)) as target:
         stored.to_netcdf(target, engine=_ENGINE, format="NETCDF4")
+
+
+def _begins_as_hdf5(path: Path) -> bool:
+    return first_bytes(path, len(_SIGNATURE)) == _SIGNATURE
+
+
+READER = Reader(
+    "netcdf",
+    read_netcdf,
+    extensions=(".nc", ".nc4"),
+    sniff=_begins_as_hdf5,
+    write=write_netcdf,
+    written=(".nc",),
+)

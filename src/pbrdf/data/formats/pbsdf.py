@@ -24,11 +24,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from pbrdf.data.build import assemble
 from pbrdf.data.conventions import mueller_flip_v, mueller_swap_sp
-from pbrdf.data.formats.tensor_file import read_tensors, write_tensors
+from pbrdf.data.formats.declaration import Reader
+from pbrdf.data.formats.tensor_file import is_tensor_file, read_tensors, write_tensors
 from pbrdf.data.formats.thinning import thinning, thinning_in_words
 from pbrdf.data.schema import NATURAL_LIGHT
 from pbrdf.data.select import match_wavelengths
-from pbrdf.data.validate import validate
+from pbrdf.data.validation import validate
 from pbrdf.errors import DataError
 from pbrdf.optics.half_difference import (
     directions,
@@ -40,6 +41,7 @@ from pbrdf.optics.half_difference import (
 __all__ = [
     "HORIZON",
     "MOST_WAVELENGTHS",
+    "READER",
     "SIMULATED",
     "PolarizedTable",
     "mueller_from_pbsdf",
@@ -263,3 +265,6 @@ def read_pbsdf(
     )
     validate(ds, origin=str(path))
     return ds
+
+
+READER = Reader("pbsdf", read_pbsdf, extensions=(".pbsdf",), sniff=is_tensor_file)

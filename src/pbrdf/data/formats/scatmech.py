@@ -11,7 +11,6 @@ is p in the plane of incidence. The reader turns the outgoing frame to s and p a
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -20,12 +19,13 @@ import xarray as xr
 
 from pbrdf.data.build import assemble
 from pbrdf.data.conventions import mueller_from_scatmech, mueller_xyxy_to_sp
-from pbrdf.data.formats.storage import read_lines
+from pbrdf.data.formats.declaration import Reader
 from pbrdf.data.select import match_wavelengths
-from pbrdf.data.validate import validate
+from pbrdf.data.validation import validate
 from pbrdf.errors import DataError
+from pbrdf.files.delimited import column_names, read_table
 
-__all__ = ["has_scatmech_columns", "read_scatmech"]
+__all__ = ["READER", "read_scatmech"]
 
 _INDICES = [(i, j) for i in range(1, 5) for j in range(1, 5)]
 _COLUMNS = {
@@ -37,11 +37,6 @@ _COLUMNS = {
     **{f"m{i}{j}": (f"f_r{i}{j}/f_r11", f"m{i}{j}") for i, j in _INDICES[1:]},
     "f_r11": ("f_r11", "fr11"),
 }
-
-
-def has_scatmech_columns(names: Sequence[str]) -> bool:
-    """Whether these are the column names of this layout."""
-    return {name.lower() for name in names} & {"f_r11", "fr11"} != set()
 
 
 def read_scatmech(path: str | Path, *, wavelength: float | Sequence[float] | None = None) -> xr.Dataset:
@@ -65,33 +60,24 @@ def read_scatmech(path: str | Path, *, wavelength: float | Sequence[float] | Non
         Names the file, the line and the column.
     """
     path = Path(path)
-    cells = csv.reader(read_lines(path), skipinitialspace=True)
-    names = [name.strip().lower() for name in next(cells)]
-    positions = {}
+    table = read_table(path)
+    names = [name.lower() for name in table.names]
+    columns = {}
     for key, spellings in _COLUMNS.items():
         found = [names.index(spelling) for spelling in spellings if spelling in names]
         if not found:
-            raise DataError(f"{path}: line 1: there is no column {' or '.join(map(repr, spellings))}")
-        positions[key] = found[0]
-
-    rows, lines = [], []
-    for line, row in enumerate(cells, start=2):
-        if not row:
-            continue
-        if len(row) != len(names):
-            raise DataError(f"{path}: line {line}: {len(row)} cells under {len(names)} column names")
-        rows.append([_number(path, line, names[index], row[index]) for index in positions.values()])
-        lines.append(line)
-    if not rows:
-        raise DataError(f"{path}: there are no rows under the column names")
-    columns = dict(zip(positions, np.array(rows).T, strict=True))
+            raise DataError(
+                f"{path}: line {table.names_line}: there is no column {' or '.join(map(repr, spellings))}"
+            )
+        columns[key] = np.array(table.numbers(found[0]))
+    table.require_rows()
 
     micrometres, which = np.unique(columns["lambda"], return_inverse=True)
     # Round: 0.351 µm times 1000 is not 351 in binary.
     available = np.round(micrometres * 1000, 6)
     keep = np.isin(which, match_wavelengths(available, wavelength, str(path)))
     columns = {key: values[keep] for key, values in columns.items()}
-    kept_lines = np.array(lines)[keep].tolist()
+    kept_lines = np.array(table.lines)[keep].tolist()
     _require_known_source(path, columns["thetai"], columns["phi"], kept_lines)
 
     phi = np.deg2rad(columns["phir"])
@@ -114,13 +100,6 @@ def read_scatmech(path: str | Path, *, wavelength: float | Sequence[float] | Non
     return ds
 
 
-def _number(path: Path, line: int, name: str, cell: str) -> float:
-    try:
-        return float(cell)
-    except ValueError:
-        raise DataError(f"{path}: line {line}, column {name!r}: {cell!r} is not a number") from None
-
-
 def _require_known_source(path: Path, theta_i: np.ndarray, phi_i: np.ndarray, lines: list[int]) -> None:
     odd = np.flatnonzero((theta_i > 0) | (phi_i != 0))
     if odd.size:
@@ -129,3 +108,12 @@ def _require_known_source(path: Path, theta_i: np.ndarray, phi_i: np.ndarray, li
             f"{path}: line {lines[row]}: thetai = {theta_i[row]:g}, phi = {phi_i[row]:g}; only thetai <= 0 "
             "with phi = 0 is understood, where forward is phir = 0 and the polarisation axes are certain"
         )
+
+
+def _has_the_columns(path: Path) -> bool:
+    return not {name.lower() for name in column_names(path)}.isdisjoint(_COLUMNS["f_r11"])
+
+
+READER = Reader(
+    "scatmech", read_scatmech, extensions=(".csv", ".tsv", ".txt", ".dat"), sniff=_has_the_columns
+)

@@ -17,7 +17,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from pbrdf.data.build import group_labels
-from pbrdf.data.formats.storage import exact_degrees, plain_attributes
+from pbrdf.data.degrees import exact_degrees
+from pbrdf.data.formats.attributes import plain_attributes
 from pbrdf.data.schema import (
     ANGLES,
     COORDINATES,
@@ -27,7 +28,7 @@ from pbrdf.data.schema import (
     std_name,
     variable_units,
 )
-from pbrdf.data.validate import validate
+from pbrdf.data.validation import validate
 from pbrdf.errors import DataError
 
 __all__ = ["from_stored", "to_stored"]

@@ -17,16 +17,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrdf.data.formats.storage import atomic_target
 from pbrdf.errors import DataError
+from pbrdf.files.atomic import atomic_file
+from pbrdf.files.text import first_bytes
 
-__all__ = ["read_tensors", "write_tensors"]
+__all__ = ["is_tensor_file", "read_tensors", "write_tensors"]
 
 _MAGIC = b"tensor_file\0"
 _HEADER = struct.Struct("<12s2BI")
 #: The enumeration of Mitsuba's ``Struct::Type``, from 1.
 _TYPES = ("u1", "i1", "<u2", "<i2", "<u4", "<i4", "<u8", "<i8", "<f2", "<f4", "<f8")
 _ALIGNMENT = 8
+
+
+def is_tensor_file(path: Path) -> bool:
+    """Whether a file begins as a tensor file."""
+    return first_bytes(path, len(_MAGIC)) == _MAGIC
 
 
 def read_tensors(path: Path) -> dict[str, NDArray[Any]]:
@@ -106,7 +112,7 @@ def write_tensors(arrays: Mapping[str, NDArray[Any]], path: Path) -> None:
         header.append(struct.pack("<H", len(names[name])) + names[name])
         header.append(struct.pack(f"<HBQ{array.ndim}Q", array.ndim, kind, offset, *array.shape))
         offset += array.nbytes
-    with atomic_target(path) as beside, beside.open("wb") as file:
+    with atomic_file(path) as beside, beside.open("wb") as file:
         file.write(b"".join(header))
         for name, array in stored.items():
             file.seek(starts[name])

@@ -10,11 +10,12 @@ from pathlib import Path
 
 import xarray as xr
 
-from pbrdf.data.formats.storage import atomic_folder
+from pbrdf.data.formats.declaration import Reader
 from pbrdf.data.formats.stored import from_stored, to_stored
 from pbrdf.errors import DataError
+from pbrdf.files.atomic import atomic_folder
 
-__all__ = ["read_zarr", "require_zarr", "write_zarr"]
+__all__ = ["READER", "read_zarr", "require_zarr", "write_zarr"]
 
 #: A folder with one of these in it is a group of Zarr arrays.
 _MARKS = (".zgroup", ".zmetadata", "zarr.json")
@@ -85,3 +86,6 @@ def require_zarr(path: Path) -> None:
     """Check that zarr is installed; raises DataError, which names the file and says how to install it."""
     if importlib.util.find_spec("zarr") is None:
         raise DataError(f"{path}: .zarr needs the package zarr: pip install zarr, or use .nc instead")
+
+
+READER = Reader("zarr", read_zarr, extensions=(".zarr",), sniff=_is_group, write=write_zarr, folder=True)

@@ -15,23 +15,22 @@ without it a positive ellipticity is left. ``dop`` is the degree of polarisation
 needs no angle). ``intensity`` is relative to the other rows (default 1; 0: the light shut out), and so is ``exposure``,
 the exposure time.
 
-Or the Stokes vectors themselves: ``series,I,Q,U,V`` (without I: 1 everywhere).
+Or the Stokes vectors themselves: ``series,I,Q,U,V`` (without I: 1 everywhere). :mod:`pbrdf.files.delimited` says how
+columns may be separated.
 """
 
 from __future__ import annotations
 
-import csv
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from pbrdf.data.formats.storage import atomic_target, read_lines
 from pbrdf.errors import DataError
+from pbrdf.files.delimited import Row, read_table, write_table
 from pbrdf.instruments.frames.frames import named
-from pbrdf.instruments.series_rows import series_rows
 from pbrdf.optics.stokes import STOKES
 
 __all__ = ["InputTable", "ellipse", "read_input_table", "write_input_table"]
@@ -122,17 +121,14 @@ def read_input_table(path: str | Path) -> InputTable:
         Names the file, and the line and the column where there is one.
     """
     path = Path(path)
-    header, rows = series_rows(path, read_lines(path))
-    _require_columns(path, header)
+    table = read_table(path)
+    _require_columns(path, table.names)
+    table.require_rows()
     names, vectors = [], []
-    for number, cells in rows:
-        place = f"{path}: line {number}"
-        row = dict(zip(header, cells, strict=True))
-        if not row["series"]:
-            raise DataError(f"{place}, column 'series': the cell is empty")
-        names.append(row["series"])
-        vector = _stokes(row, place) if "Q" in row else _ellipse(row, place)
-        vectors.append(vector * _number(row, "exposure", 1.0, place, low=0.0))
+    for row in table:
+        names.append(row.text("series"))
+        vector = _stokes(row) if "Q" in table.names else _ellipse(row)
+        vectors.append(vector * _number(row, "exposure", 1.0, low=0.0))
     try:
         return InputTable(tuple(names), np.array(vectors).T)
     except DataError as error:
@@ -141,13 +137,8 @@ def read_input_table(path: str | Path) -> InputTable:
 
 def write_input_table(table: InputTable, path: str | Path) -> None:
     """Write the Stokes vectors of a table as :func:`read_input_table` reads them; raises DataError if it cannot."""
-    path = Path(path)
-    with atomic_target(path) as target, target.open("x", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["series", *STOKES])
-        writer.writerows(
-            [n, *map(repr, s)] for n, s in zip(table.names, table.stokes.T.tolist(), strict=True)
-        )
+    rows = zip(table.names, table.stokes.T.tolist(), strict=True)
+    write_table(Path(path), ["series", *STOKES], ([name, *map(repr, S)] for name, S in rows))
 
 
 def _require_columns(path: Path, header: Sequence[str]) -> None:
@@ -170,44 +161,36 @@ def _require_columns(path: Path, header: Sequence[str]) -> None:
 
 
 def _number(
-    row: Mapping[str, str],
-    name: str,
-    default: float | None,
-    place: str,
-    low: float = -math.inf,
-    high: float = math.inf,
+    row: Row, name: str, default: float | None, low: float = -math.inf, high: float = math.inf
 ) -> float:
-    text = row.get(name, "")
-    if not text and default is not None:
+    """The number in a cell; the default, where there is one, if it is empty or there is no such column."""
+    if not row.get(name) and default is not None:
         return default
-    try:
-        value = float(text)
-    except ValueError:
-        raise DataError(f"{place}, column {name!r}: {text!r} is not a number") from None
+    value = row.number(name)
     if not (math.isfinite(value) and low <= value <= high):
         limits = f"from {low:g} to {high:g}" if math.isfinite(high) else f"of {low:g} or more"
-        raise DataError(f"{place}, column {name!r}: {text} is not a number {limits}")
+        raise DataError(f"{row.place(name)}: {row.get(name)} is not a number {limits}")
     return value
 
 
-def _stokes(row: Mapping[str, str], place: str) -> np.ndarray:
-    first = _number(row, "I", 1.0, place)
-    return np.array([first, *(_number(row, name, None, place) for name in STOKES[1:])])
+def _stokes(row: Row) -> np.ndarray:
+    first = _number(row, "I", 1.0)
+    return np.array([first, *(_number(row, name, None) for name in STOKES[1:])])
 
 
-def _ellipse(row: Mapping[str, str], place: str) -> np.ndarray:
-    hand = row.get("handedness", "").lower()
+def _ellipse(row: Row) -> np.ndarray:
+    hand = row.get("handedness").lower()
     if hand not in ("", "left", "right"):
-        raise DataError(f"{place}, column 'handedness': {hand!r}: use left (V > 0), right, or leave it empty")
-    intensity = _number(row, "intensity", 1.0, place, low=0.0)
-    dop = _number(row, "dop", 1.0, place, low=0.0, high=1.0)
-    chi = _number(row, "ellipticity_deg", 45.0 if hand else 0.0, place, low=-45.0, high=45.0)
+        raise DataError(f"{row.place('handedness')}: {hand!r}: use left (V > 0), right, or leave it empty")
+    intensity = _number(row, "intensity", 1.0, low=0.0)
+    dop = _number(row, "dop", 1.0, low=0.0, high=1.0)
+    chi = _number(row, "ellipticity_deg", 45.0 if hand else 0.0, low=-45.0, high=45.0)
     if hand:
         if chi < 0.0 and hand == "left":
-            raise DataError(f"{place}: a negative ellipticity is right-handed, but handedness is left")
+            raise DataError(f"{row.line}: a negative ellipticity is right-handed, but handedness is left")
         chi = abs(chi) if hand == "left" else -abs(chi)
     needs_angle = abs(chi) < 45.0 and dop > 0.0 and intensity > 0.0
     if needs_angle and not row.get("angle_deg"):
-        raise DataError(f"{place}, column 'angle_deg': give the angle, or dop = 0 for natural light")
-    angle = _number(row, "angle_deg", 0.0, place)
+        raise DataError(f"{row.line}, column 'angle_deg': give the angle, or dop = 0 for natural light")
+    angle = _number(row, "angle_deg", 0.0)
     return intensity * ellipse(math.radians(angle), math.radians(chi), dop)

@@ -10,7 +10,7 @@ A CSV file with one row a series, for example::
 ``series`` is the name by which the frames are called. Angles are in degrees, or in radians in a column whose name ends
 in ``_rad`` or after a line ``# angles: radians``. ``phi`` is the relative azimuth, 0 in the forward half-plane unless
 the line ``# azimuth: forward=180`` says otherwise; without the column all was measured in the plane of incidence, and
-θ_r < 0 is on the side of the source.
+θ_r < 0 is on the side of the source. :mod:`pbrdf.files.delimited` says how columns may be separated.
 Optional: ``group``; ``wavelength`` (nm); ``exposure``, the exposure time in any one unit, by which signals are divided;
 ``reference_angle``, in place of the instrument's, where the camera was turned between series; ``sample_angle``, how the
 sample stood (the paper's Angle_S_I), kept for the record.
@@ -18,9 +18,8 @@ sample stood (the paper's Angle_S_I), kept for the record.
 
 from __future__ import annotations
 
-import csv
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -30,16 +29,17 @@ from numpy.typing import ArrayLike
 
 from pbrdf.data.build import group_labels
 from pbrdf.data.conventions import azimuth_forward_pi_to_zero
-from pbrdf.data.formats.storage import atomic_target, exact_degrees, read_lines
+from pbrdf.data.degrees import exact_degrees
 from pbrdf.errors import DataError
+from pbrdf.files.delimited import Table, read_table, write_table
 from pbrdf.instruments.frames.frames import named
-from pbrdf.instruments.series_rows import series_rows
 
 __all__ = ["AngleTable", "read_angles", "write_angles"]
 
 _ANGLES = ("theta_i", "theta_r", "phi", "reference_angle", "sample_angle")
 _COLUMNS = ("series", *_ANGLES[:3], "group", "wavelength", "exposure", *_ANGLES[3:])
 _NEEDED = ("series", "theta_i", "theta_r")
+_MAY_BE_EMPTY = ("wavelength", "reference_angle", "sample_angle")
 _UNITS = {
     "deg": "deg",
     "degree": "deg",
@@ -149,28 +149,17 @@ def read_angles(path: str | Path) -> AngleTable:
         Names the file, and the line and the column where there is one.
     """
     path = Path(path)
-    lines = read_lines(path)
-    forward_at_zero = _stated(path, lines, "azimuth", ("forward=0", "forward=180")) == "forward=0"
-    usual = "rad" if _stated(path, lines, "angles", ("degrees", "radians")) == "radians" else "deg"
-    names, found = series_rows(path, lines)
-    columns = _columns(path, names, usual)
-    rows = list(found)
-
-    def cells_of(name: str) -> Iterator[tuple[str, str]]:
-        index, _ = columns[name]
-        for number, cells in rows:
-            yield cells[index], f"{path}: line {number}, column {names[index]!r}"
-
+    table = read_table(path)
+    forward_at_zero = _stated(table, "azimuth", ("forward=0", "forward=180")) == "forward=0"
+    usual = "rad" if _stated(table, "angles", ("degrees", "radians")) == "radians" else "deg"
+    columns = _columns(path, table.names, usual)
+    table.require_rows()
     values: dict[str, Any] = {}
-    for name, (_, unit) in columns.items():
+    for name, (index, unit) in columns.items():
         if name in ("series", "group"):
-            texts = list(cells_of(name))
-            for text, place in texts:
-                if not text:
-                    raise DataError(f"{place}: the cell is empty")
-            values[name] = [text for text, _ in texts]
+            values[name] = [table.text(row, index) for row in range(len(table))]
         else:
-            values[name] = np.array([_number(text, place, name) for text, place in cells_of(name)])
+            values[name] = np.array(table.numbers(index, ("",) if name in _MAY_BE_EMPTY else ()))
             if name == "phi" and not forward_at_zero:
                 values[name] = azimuth_forward_pi_to_zero(values[name], np.pi if unit == "rad" else 180.0)
             if name in _ANGLES and unit != "rad":
@@ -182,14 +171,14 @@ def read_angles(path: str | Path) -> AngleTable:
         raise DataError(f"{path}: {error}") from None
 
 
-def _stated(path: Path, lines: Sequence[str], key: str, choices: tuple[str, str]) -> str:
+def _stated(table: Table, key: str, choices: tuple[str, str]) -> str:
     """What the line ``# key: …`` states, the first choice where there is none."""
-    for line in lines:
-        stated = re.fullmatch(rf"#\s*{key}\s*:(.*)", line.strip(), re.IGNORECASE)
+    for _, comment in table.comments:
+        stated = re.fullmatch(rf"#\s*{key}\s*:(.*)", comment, re.IGNORECASE)
         if stated:
             text = stated[1].replace(" ", "").lower()
             if text not in choices:
-                raise DataError(f"{path}: {key} is {text!r}; use {' or '.join(choices)}")
+                raise DataError(f"{table.path}: {key} is {text!r}; use {' or '.join(choices)}")
             return text
     return choices[0]
 
@@ -216,15 +205,6 @@ def _columns(path: Path, names: list[str], usual: str) -> dict[str, tuple[int, s
     return found
 
 
-def _number(text: str, place: str, name: str) -> float:
-    if not text and name in ("reference_angle", "sample_angle", "wavelength"):
-        return float("nan")
-    try:
-        return float(text)
-    except ValueError:
-        raise DataError(f"{place}: {text!r} is not a number") from None
-
-
 def _sides(path: Path, values: dict[str, Any]) -> None:
     """A negative θ_r is the other side of the normal: |θ_r| at φ + 180°."""
     in_plane = "phi" not in values
@@ -244,7 +224,6 @@ def write_angles(table: AngleTable, path: str | Path) -> None:
     DataError
         If the file cannot be written.
     """
-    path = Path(path)
     columns: dict[str, list[str]] = {"series": list(table.names)}
     for field in _COLUMNS[1:]:
         values = getattr(table, field)
@@ -256,11 +235,7 @@ def write_angles(table: AngleTable, path: str | Path) -> None:
         elif field == "wavelength":
             field = "wavelength_nm"
         columns[field] = [_cell(value) for value in values.tolist()]
-    with atomic_target(path) as target, target.open("x", encoding="utf-8", newline="") as file:
-        file.write("# azimuth: forward=0\n")
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(columns)
-        writer.writerows(zip(*columns.values(), strict=True))
+    write_table(Path(path), columns, zip(*columns.values(), strict=True), {"azimuth": "forward=0"})
 
 
 def _cell(value: Any) -> str:

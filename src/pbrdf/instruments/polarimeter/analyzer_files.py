@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from pathlib import Path
 
 import numpy as np
 
-from pbrdf.data.formats.storage import atomic_target, read_lines
 from pbrdf.errors import DataError
+from pbrdf.files.atomic import atomic_file
+from pbrdf.files.delimited import read_table, write_table
 from pbrdf.instruments.polarimeter.polarimeter import Polarimeter, measured
 from pbrdf.optics.stokes import STOKES
 
@@ -24,13 +23,14 @@ def read_analyzer(path: str | Path) -> Polarimeter:
     Parameters
     ----------
     path
-        ``.csv`` with the columns state, w_I, w_Q, w_U, w_V and a row for each state; or ``.nc`` with a variable
+        ``.csv`` with the columns state, w_I, w_Q, w_U, w_V (:mod:`pbrdf.files.delimited` says how they may be
+        separated) and a row for each state; or ``.nc`` with a variable
         ``analyzer`` over (row, column, state, stokes) or (state, stokes).
 
     Raises
     ------
     DataError
-        If the file cannot be read or lacks what is expected; names the file and the line.
+        If the file cannot be read or lacks what is expected; names the file, the line and the column.
     """
     path = Path(path)
     readers = {".csv": _read_csv, ".nc": _read_netcdf}
@@ -66,17 +66,11 @@ def write_analyzer(polarimeter: Polarimeter, path: str | Path) -> None:
             {"state": list(polarimeter.states), "stokes": list(STOKES)},
             {"title": "analyser vectors W, intensity = W·(I, Q, U, V); x towards y, V > 0 left circular"},
         )
-        with atomic_target(path) as target:
+        with atomic_file(path) as target:
             stored.to_netcdf(target, engine="h5netcdf", format="NETCDF4")
     elif path.suffix.lower() == ".csv" and not polarimeter.is_map:
-        text = io.StringIO()
-        writer = csv.writer(text, lineterminator="\n")
-        writer.writerow(["state", *_COLUMNS])
-        writer.writerows(
-            [n, *map(repr, w)] for n, w in zip(polarimeter.states, polarimeter.analyzer.tolist(), strict=True)
-        )
-        with atomic_target(path) as target:
-            target.write_text(text.getvalue(), encoding="utf-8")
+        rows = zip(polarimeter.states, polarimeter.analyzer.tolist(), strict=True)
+        write_table(path, ["state", *_COLUMNS], ([name, *map(repr, w)] for name, w in rows))
     else:
         kind = "a map of analyser vectors" if polarimeter.is_map else "analyser vectors"
         use = ".nc" if polarimeter.is_map else ".csv or .nc"
@@ -84,27 +78,10 @@ def write_analyzer(polarimeter: Polarimeter, path: str | Path) -> None:
 
 
 def _read_csv(path: Path) -> tuple[np.ndarray, list[str] | None]:
-    rows = [
-        (number, row)
-        for number, row in enumerate(csv.reader(read_lines(path)), 1)
-        if row and not row[0].startswith("#")
-    ]
-    header = [name.strip() for name in rows[0][1]] if rows else []
-    expected = ["state", *_COLUMNS]
-    missing = [name for name in expected if name not in header]
-    if missing:
-        raise DataError(f"{path}: there is no column {missing[0]!r}; the columns are {', '.join(expected)}")
-    places = [header.index(name) for name in expected]
-    states, vectors = [], []
-    for number, row in rows[1:]:
-        try:
-            states.append(row[places[0]].strip())
-            vectors.append([float(row[place]) for place in places[1:]])
-        except (IndexError, ValueError):
-            raise DataError(
-                f"{path}: line {number}: give a name and the four numbers {', '.join(_COLUMNS)}"
-            ) from None
-    return np.array(vectors, dtype=float).reshape(-1, 4), states
+    table = read_table(path)
+    state = table.column("state")
+    vectors = [table.numbers(table.column(name)) for name in _COLUMNS]
+    return np.array(vectors).T, [cells[state] for cells in table.rows]
 
 
 def _read_netcdf(path: Path) -> tuple[np.ndarray, list[str] | None]:

@@ -8,7 +8,6 @@ contrast. The Stokes vector is taken as the same all over the band.
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pbrdf.errors import DataError
+from pbrdf.files.delimited import read_table
 from pbrdf.instruments.polarimeter.polarimeter import Polarimeter, from_settings
 
 __all__ = ["Band", "cauchy", "gaussian_band", "in_band", "read_band", "tabulated_band", "top_hat_band"]
@@ -119,33 +119,18 @@ def tabulated_band(wavelengths: ArrayLike, transmission: ArrayLike) -> Band:
 def read_band(path: str | Path) -> Band:
     """A tabulated band from a CSV file with the columns ``wavelength_nm`` and ``transmission``, see `tabulated_band`.
 
+    :mod:`pbrdf.files.delimited` says how columns may be separated.
+
     Raises
     ------
     DataError
-        If the file cannot be read or does not hold that; names the file and the line.
+        If the file cannot be read or does not hold that; names the file, the line and the column.
     """
-    from pbrdf.data.formats.storage import read_lines
-
     path = Path(path)
-    rows = [
-        (number, row)
-        for number, row in enumerate(csv.reader(read_lines(path)), 1)
-        if row and not row[0].startswith("#")
-    ]
-    header = [name.strip() for name in rows[0][1]] if rows else []
-    for name in _COLUMNS:
-        if name not in header:
-            raise DataError(f"{path}: there is no column {name!r}; the columns are {', '.join(_COLUMNS)}")
-    table = []
-    for number, row in rows[1:]:
-        try:
-            table.append([float(row[header.index(name)]) for name in _COLUMNS])
-        except (IndexError, ValueError):
-            raise DataError(
-                f"{path}: line {number}: give a number for each of {', '.join(_COLUMNS)}"
-            ) from None
+    table = read_table(path)
+    wavelengths, transmission = (table.numbers(table.column(name)) for name in _COLUMNS)
     try:
-        return tabulated_band(*np.array(table, dtype=float).reshape(-1, 2).T)
+        return tabulated_band(wavelengths, transmission)
     except DataError as error:
         raise DataError(f"{path}: {error}") from error
 

@@ -12,7 +12,6 @@ import json
 import math
 import os
 import re
-import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -20,8 +19,9 @@ from typing import Any
 
 import numpy as np
 
-from pbrdf.data.formats.storage import atomic_target
 from pbrdf.errors import DataError, PbrdfError
+from pbrdf.files.atomic import atomic_file
+from pbrdf.files.text import read_toml
 from pbrdf.instruments.polarimeter.analyzer_files import read_analyzer, write_analyzer
 from pbrdf.instruments.polarimeter.band import Band, cauchy, gaussian_band, in_band, read_band, top_hat_band
 from pbrdf.instruments.polarimeter.detector import Detector
@@ -60,7 +60,7 @@ def load_instrument(path: str | Path) -> Instrument:
         If the file cannot be read, is not TOML, or says something that is not understood: names file, table and key.
     """
     path = Path(path)
-    content = _parse(path)
+    content = read_toml(path)
     top = _Table(path, "", content, ("polarimeter", "detector", "frames"))
     if "polarimeter" not in content:
         raise DataError(f"{path}: there is no table [polarimeter]; it says what the instrument is, kind = …")
@@ -130,22 +130,11 @@ def save_instrument(instrument: Instrument, path: str | Path) -> None:
     for name, content in (("polarimeter", table), ("detector", detector), ("frames", frames)):
         if content:
             lines += [f"[{name}]", *(f"{_key(k)} = {_value(v)}" for k, v in content.items()), ""]
-    with atomic_target(path) as target:
+    with atomic_file(path) as target:
         target.write_text("\n".join(lines), encoding="utf-8")
 
 
 # Reading
-
-
-def _parse(path: Path) -> dict[str, Any]:
-    try:
-        return tomllib.loads(path.read_bytes().decode("utf-8-sig"))
-    except OSError as error:
-        raise DataError(f"{path}: cannot be read: {error.strerror or error}") from error
-    except UnicodeDecodeError as error:
-        raise DataError(f"{path}: not UTF-8 text; save the file as UTF-8") from error
-    except tomllib.TOMLDecodeError as error:
-        raise DataError(f"{path}: not a TOML file: {error}") from error
 
 
 class _Table:

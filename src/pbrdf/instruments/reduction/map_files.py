@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from pbrdf.data.formats.csv_columns import COVARIANCES
+from pbrdf.data.formats.csv_table.columns import COVARIANCES
 from pbrdf.data.formats.zarr_folder import require_zarr
 from pbrdf.errors import DataError
 from pbrdf.instruments.frames.frames import Frames

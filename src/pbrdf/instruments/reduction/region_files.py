@@ -12,24 +12,23 @@ TOML, one table a region, with one of four keys::
     labels = "labels.png"                            # picture of whole numbers
     value = 3
 
-CSV, rectangles only, with the columns ``name,x0,x1,y0,y1``. A picture (PNG, TIFF, NPY) of whole numbers: each number
-but 0 is a region of that name. On the command line: ``paint=100:200,150:260`` (x0:x1,y0:y1),
-``disc=ellipse:320,240,40,30``, ``edge=polygon:10,10,90,20,50,80``.
+CSV, rectangles only, with the columns ``name,x0,x1,y0,y1`` (:mod:`pbrdf.files.delimited` says how they may be
+separated). A picture (PNG, TIFF, NPY) of whole numbers: each number but 0 is a region of that name. On the command
+line: ``paint=100:200,150:260`` (x0:x1,y0:y1), ``disc=ellipse:320,240,40,30``, ``edge=polygon:10,10,90,20,50,80``.
 """
 
 from __future__ import annotations
 
-import csv
 import math
-import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from pbrdf.data.formats.storage import read_lines
 from pbrdf.errors import DataError
+from pbrdf.files.delimited import read_table
+from pbrdf.files.text import read_toml
 from pbrdf.instruments.frames.pictures import SUFFIXES, open_pictures
 from pbrdf.instruments.reduction.regions import Ellipse, LabelRegion, Polygon, Rectangle, Region
 
@@ -112,12 +111,8 @@ def read_regions(path: str | Path) -> dict[str, Region]:
 
 
 def _from_toml(path: Path) -> dict[str, Region]:
-    try:
-        content = tomllib.loads("\n".join(read_lines(path)))
-    except tomllib.TOMLDecodeError as error:
-        raise DataError(f"{path}: not a TOML file: {error}") from error
     regions: dict[str, Region] = {}
-    for name, table in content.items():
+    for name, table in read_toml(path).items():
         try:
             regions[name] = _from_table(table, path.parent)
         except DataError as error:
@@ -146,29 +141,22 @@ def _from_table(table: Any, folder: Path) -> Region:
 
 
 def _from_csv(path: Path) -> dict[str, Region]:
-    lines = [
-        (n, line) for n, line in enumerate(read_lines(path), 1) if line.strip() and not line.startswith("#")
-    ]
-    rows = list(csv.reader((line for _, line in lines), skipinitialspace=True))
-    names = [name.strip() for name in rows[0]] if rows else []
+    table = read_table(path)
     wanted = ("name", "x0", "x1", "y0", "y1")
-    if sorted(names) != sorted(wanted):
-        raise DataError(f"{path}: its columns are {', '.join(names)}; give {', '.join(wanted)}")
+    if sorted(table.names) != sorted(wanted):
+        raise DataError(f"{path}: its columns are {', '.join(table.names)}; give {', '.join(wanted)}")
     regions: dict[str, Region] = {}
-    for (number, _), cells in zip(lines[1:], rows[1:], strict=True):
-        cell = dict(zip(names, cells, strict=False))
+    for row in table:
+        name = row.text("name")
+        if name in regions:
+            raise DataError(f"{row.line}: {name!r} stands there twice")
+        edges = [row.number(key) for key in wanted[1:]]
+        if not all(map(math.isfinite, edges)):
+            raise DataError(f"{row.line}: give a name and four finite numbers")
         try:
-            name = cell["name"].strip()
-            regions_name = Rectangle(*(_finite(cell[key]) for key in wanted[1:]))
+            regions[name] = Rectangle(*edges)
         except DataError as error:
-            raise DataError(f"{path}: line {number}: {error}") from error
-        except (KeyError, ValueError):
-            raise DataError(f"{path}: line {number}: give a name and four numbers") from None
-        if not name or name in regions:
-            raise DataError(
-                f"{path}: line {number}: {'there is no name' if not name else f'{name!r} stands there twice'}"
-            )
-        regions[name] = regions_name
+            raise DataError(f"{row.line}: {error}") from error
     return regions
 
 

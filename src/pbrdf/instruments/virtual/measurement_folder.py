@@ -7,31 +7,15 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from pbrdf.data.formats.storage import atomic_folder
 from pbrdf.data.readers import write
 from pbrdf.errors import DataError
+from pbrdf.files.atomic import atomic_folder, require_new_folder
 from pbrdf.instruments.frames.mosaic import weave_mosaic
 from pbrdf.instruments.goniometer.angle_table import write_angles
 from pbrdf.instruments.polarimeter.instrument_files import save_instrument
 from pbrdf.instruments.virtual.experiment import Measurement
 
-__all__ = ["require_new", "write_measurement"]
-
-
-def require_new(folder: Path) -> None:
-    """Check that a folder of this name can be made: old frames among new ones would be taken for them.
-
-    Raises
-    ------
-    DataError
-        If there is something of that name that is not an empty folder, or no folder to put it into.
-    """
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise DataError(
-            f"{folder}: there is something of that name already; choose another folder with --output"
-        )
-    if not folder.resolve().parent.is_dir():
-        raise DataError(f"{folder}: there is no folder {folder.parent}")
+__all__ = ["write_measurement"]
 
 
 def write_measurement(
@@ -63,13 +47,13 @@ def write_measurement(
         If the folder is not new or cannot be written, or a name cannot be that of a file.
     """
     folder = Path(folder)
-    require_new(folder)
+    require_new_folder(folder)
     for name in (*measurement.samples, *measurement.experiment.instrument.polarimeter.states):
         if not name or "/" in name or "\\" in name or name.startswith("."):
             raise DataError(f"{name!r} cannot be the name of a file: call the sample or the state otherwise")
     with atomic_folder(folder) as target:
-        for part in (target, target / "frames", target / "truth"):
-            part.mkdir()
+        for part in ("frames", "truth"):
+            (target / part).mkdir()
         _write_frames(measurement, target / "frames")
         mosaic = measurement.experiment.instrument.polarimeter.mosaic is not None
         pattern = "{series}.png" if mosaic else "{series}_{state}.png"

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import json
-import shutil
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pbrdf.data.formats.storage import exact_degrees, name_beside
-from pbrdf.errors import DataError
+from pbrdf.data.degrees import exact_degrees
+from pbrdf.files.atomic import atomic_folder
 from pbrdf.inversion.stored_result import FILE_NAME, write_result
 from pbrdf.report.fit.subject import Report
 from pbrdf.report.fit.summary import summary_text
@@ -28,36 +25,11 @@ if TYPE_CHECKING:
 __all__ = [
     "FIGURE_FORMATS",
     "comparison_file",
-    "complete_folder",
     "fit_record",
-    "require_writable",
     "write_report",
 ]
 
 FIGURE_FORMATS = ("png", "pdf", "svg")
-
-
-def require_writable(directory: Path) -> None:
-    """Check before long work that a folder of this name can be made or filled, leaving nothing behind.
-
-    Raises
-    ------
-    DataError
-        If it cannot; the message says why.
-    """
-    if directory.exists() and not directory.is_dir():
-        raise DataError(f"{directory}: there is a file of that name; choose another folder with --output")
-    trial = name_beside(directory.resolve())
-    missing = [p for p in directory.parents if not p.exists()]
-    try:
-        trial.mkdir(parents=True)
-        trial.rmdir()
-    except OSError as error:
-        raise DataError(f"{directory}: cannot be written: {error.strerror or error}") from error
-    finally:
-        for parent in missing:  # innermost first
-            if parent.is_dir():
-                parent.rmdir()
 
 
 def write_report(report: Report, directory: Path, *, figure_format: str = "png") -> list[Path]:
@@ -89,7 +61,7 @@ def write_report(report: Report, directory: Path, *, figure_format: str = "png")
 
     names = ["summary.txt", f"figure.{figure_format}", "model.json", "fit.json", "comparison.nc"]
     names += [f"starts.{figure_format}", FILE_NAME]
-    with complete_folder(directory) as temporary:
+    with atomic_folder(directory, fill=True) as temporary:
         (temporary / "summary.txt").write_text(summary_text(report), encoding="utf-8")
         save_figure(fit_figure(report), temporary / f"figure.{figure_format}")
         report.result.model.to_json(temporary / "model.json")
@@ -102,45 +74,6 @@ def write_report(report: Report, directory: Path, *, figure_format: str = "png")
             save_figure(contour_figure(report), temporary / f"contours.{figure_format}")
             names.append(f"contours.{figure_format}")
     return [directory / name for name in names]
-
-
-@contextmanager
-def complete_folder(directory: Path) -> Iterator[Path]:
-    """A folder to fill that becomes `directory` when the block ends well, and goes otherwise.
-
-    A new folder appears complete; in one that is there, the files of the same names are replaced and others are left
-    alone.
-
-    Raises
-    ------
-    DataError
-        If the folder cannot be written.
-    """
-    temporary = name_beside(directory.resolve())
-    try:
-        temporary.mkdir(parents=True)
-        yield temporary
-        if directory.is_dir():
-            _move_into(temporary, directory)
-        else:
-            temporary.rename(directory)
-    except OSError as error:
-        raise DataError(f"{directory}: cannot be written: {error.strerror or error}") from error
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
-
-
-def _move_into(folder: Path, target: Path) -> None:
-    """Move what a folder holds; folders of the same name are filled, but one of Zarr is one thing and is replaced."""
-    for entry in sorted(folder.iterdir()):
-        place = target / entry.name
-        if entry.is_dir() and entry.suffix != ".zarr":
-            place.mkdir(exist_ok=True)
-            _move_into(entry, place)
-        else:
-            if entry.is_dir() and place.is_dir():
-                shutil.rmtree(place)
-            entry.replace(place)
 
 
 def fit_record(report: Report) -> dict[str, Any]:

@@ -7,12 +7,13 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from pbrdf.files.atomic import require_writable_folder
 from pbrdf.inversion.estimates import Estimate
 from pbrdf.inversion.holdout import Prediction
 from pbrdf.inversion.result import FitResult
 from pbrdf.report.fit.checks import run_checks
 from pbrdf.report.fit.figure import fit_figure
-from pbrdf.report.fit.folder import require_writable, write_report
+from pbrdf.report.fit.folder import write_report
 from pbrdf.report.fit.subject import Report
 from pbrdf.report.fit.summary import summary_text
 from pbrdf.report.numbers import brief, per_cent, shown_unit, with_error
@@ -48,7 +49,7 @@ def figure(result: FitResult) -> Figure:
 
 def save(result: FitResult, folder: Path, figure_format: str = "png") -> list[Path]:
     """Write the folder of ``pbrdf fit``."""
-    require_writable(folder)
+    require_writable_folder(folder)
     return write_report(_report(result), folder, figure_format=figure_format)
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pbrdf.data.formats.storage import atomic_target
+from pbrdf.files.atomic import atomic_file
 from pbrdf.instruments.calibration.analyzer_calibration import Calibration
 from pbrdf.instruments.calibration.settings_calibration import ModelCalibration
 from pbrdf.optics.stokes import STOKES, aolp, docp, dolp
@@ -146,7 +146,7 @@ def write_inputs(made: InstrumentCalibration, path: Path) -> None:
         columns += [dolp(last), np.rad2deg(aolp(last)), docp(last)]
         header += [f"{name}_dolp", f"{name}_aolp_deg", f"{name}_docp"]
     out = made.calibration.held_out
-    with atomic_target(path) as target, target.open("x", encoding="utf-8", newline="") as file:
+    with atomic_file(path) as target, target.open("x", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(header)
         for k, name in enumerate(made.inputs.names):

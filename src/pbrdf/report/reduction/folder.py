@@ -9,6 +9,7 @@ from typing import Any
 
 from pbrdf.data.readers import write
 from pbrdf.errors import DataError
+from pbrdf.files.atomic import atomic_folder
 from pbrdf.instruments.frames.frames import Frames
 from pbrdf.instruments.goniometer.angle_table import AngleTable
 from pbrdf.instruments.polarimeter.instrument import Instrument
@@ -18,7 +19,6 @@ from pbrdf.instruments.reduction.reduce import Sink, reduce
 from pbrdf.instruments.reduction.region_averages import RegionAverage, RegionCollector
 from pbrdf.instruments.reduction.regions import Rectangle, Region
 from pbrdf.instruments.reduction.streaming import DEFAULT_MEMORY
-from pbrdf.report.fit.folder import complete_folder
 from pbrdf.report.reduction.gallery import Gallery, safe_name
 from pbrdf.report.reduction.summary import write_averages
 from pbrdf.version import __version__
@@ -114,7 +114,7 @@ def write_reduction(
     file_names = _file_names(wanted.regions)
     sinks: list[Sink[Any]] = [whole, parts]
     names = ["summary.csv"]
-    with complete_folder(directory) as temporary:
+    with atomic_folder(directory, fill=True) as temporary:
         if wanted.maps is not None:
             names.append(f"stokes.{wanted.maps}")
             described = {"title": f"Stokes parameters of {name}", "source": f"pbrdf {__version__}"}

@@ -1,0 +1,162 @@
+"""A data set from the variables of a CSV file: its conventions turned into the project's."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from pbrdf.data import conventions
+from pbrdf.data.build import assemble
+from pbrdf.data.covariance import square
+from pbrdf.data.formats.csv_table.columns import CHANNELS, COVARIANCES, ELEMENTS, Column
+from pbrdf.data.formats.csv_table.header import Header
+from pbrdf.data.schema import QUANTITIES, std_name
+from pbrdf.errors import DataError
+from pbrdf.files.delimited import Table
+from pbrdf.optics.stokes import STOKES
+
+__all__ = ["to_dataset"]
+
+
+def to_dataset(
+    table: Table,
+    header: Header,
+    columns: list[Column],
+    values: dict[str, NDArray[Any]],
+    ignored: list[str],
+) -> xr.Dataset:
+    """Assemble what the columns hold.
+
+    Parameters
+    ----------
+    table
+        The file's text, for messages.
+    header
+        The file's conventions.
+    columns
+        The columns that were understood.
+    values
+        Their values by variable, as :func:`pbrdf.data.formats.csv_table.values.column_values` gives them.
+    ignored
+        Names of the columns left out.
+
+    Returns
+    -------
+    xarray.Dataset
+        In the project's conventions, not yet validated; the attribute ``assumptions`` says what the file left open.
+
+    Raises
+    ------
+    DataError
+        If the quantity is not stated, a side is not clear, or the variables do not fit together.
+    """
+    assumptions = []
+    azimuth = next((column for column in columns if column.variable == "phi"), None)
+    if azimuth is not None:
+        if "azimuth" in header.unstated and azimuth.index is not None:
+            assumptions.append("the file does not say where phi = 0 lies; the forward half-plane was assumed")
+        phi = values["phi"]
+        values["phi"] = np.where(values["theta_r"] < 0, phi + np.where(phi > 0, -np.pi, np.pi), phi)
+    else:
+        _require_positive_incidence(table, values["theta_i"], columns)
+        values["phi"] = np.where(values["theta_r"] < 0, np.pi, 0.0)
+        assumptions.append(
+            "the file has no azimuth; theta_r >= 0 was taken as forward, theta_r < 0 as backward"
+        )
+    # Not abs(), which would lose the sign of −0.0 that a round trip has to keep.
+    values["theta_r"] = np.where(values["theta_r"] < 0, -values["theta_r"], values["theta_r"])
+
+    channels = {name: values[name] for name in CHANNELS if name in values}
+    std = {name: values[std_name(name)] for name in CHANNELS if std_name(name) in values}
+    channels, std = _gather_mueller(channels), _gather_mueller(std)
+    covariance = _gather_covariance(values)
+    if "stokes" in header.unstated and channels.keys() & {"Q", "U", "aolp", "mueller"}:
+        assumptions.append("the file does not say what Q > 0 means; Q = I_p - I_s was assumed")
+    illumination = header.illumination
+    if not header.p_minus_s:
+        illumination = conventions.stokes_swap_sp(illumination).tolist()
+        channels = _swap_sp(channels)
+        covariance = None if covariance is None else conventions.covariance_swap_sp(covariance)
+    if header.cosine_weighted:
+        for part in (channels, std):
+            for name in part.keys() - {"dolp", "aolp"}:
+                part[name] = conventions.remove_cosine_weight(part[name], values["theta_r"])
+        if covariance is not None:
+            for _ in range(2):
+                covariance = conventions.remove_cosine_weight(covariance, values["theta_r"])
+
+    if covariance is not None:
+        for i, name in enumerate(STOKES):
+            if COVARIANCES[i, i] not in values and name in std:
+                covariance[:, i, i] = square(std[name])
+    extra: dict[str, Any] = {"ignored_columns": ignored} if ignored else {}
+    if assumptions:
+        extra["assumptions"] = assumptions
+    coordinates = {name: values.get(name) for name in ("theta_i", "theta_r", "phi", "wavelength", "group")}
+    attrs = {
+        **header.attrs,
+        "quantity": _quantity(table, header, columns),
+        "illumination": illumination,
+        **extra,
+    }
+    try:
+        return assemble(coordinates, channels, std, attrs, covariance)
+    except DataError as error:
+        raise DataError(f"{table.path}: {error}") from None
+
+
+def _require_positive_incidence(table: Table, theta_i: NDArray[np.float64], columns: list[Column]) -> None:
+    negative = np.flatnonzero(theta_i < 0)
+    if negative.size:
+        index = next(column.index for column in columns if column.variable == "theta_i") or 0
+        raise DataError(
+            f"{table.place(int(negative[0]), index)}: a negative theta_i without an azimuth column could "
+            "mean either side; count theta_i from 0 to 90 and give theta_r the sign, or add phi"
+        )
+
+
+def _quantity(table: Table, header: Header, columns: list[Column]) -> str:
+    implied = next((c.quantity for c in columns if c.variable == "I"), None)
+    if header.quantity is None and implied is None:
+        raise DataError(
+            f"{table.path}: it does not say what was measured; add a line '# quantity: …' or the option "
+            f"quantity, one of {', '.join(QUANTITIES)}"
+        )
+    return header.quantity or str(implied)
+
+
+def _gather_mueller(values: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """Replace the columns m00 … m33 by one array (N, 4, 4); elements without a column are NaN."""
+    elements = {name: value for name, value in values.items() if name in ELEMENTS}
+    rest = {name: value for name, value in values.items() if name not in ELEMENTS}
+    if elements:
+        missing = np.full(len(next(iter(elements.values()))), np.nan)
+        stacked = np.stack([elements.get(name, missing) for name in ELEMENTS], axis=-1)
+        rest["mueller"] = stacked.reshape(-1, 4, 4)
+    return rest
+
+
+def _gather_covariance(values: Mapping[str, NDArray[Any]]) -> NDArray[np.float64] | None:
+    """The covariance, shape (N, 4, 4), from its columns, NaN where there is none; None without any."""
+    if not values.keys() & set(COVARIANCES.values()):
+        return None
+    matrix = np.full((len(values["theta_i"]), 4, 4), np.nan)
+    for (i, j), name in COVARIANCES.items():
+        if name in values:
+            matrix[:, i, j] = matrix[:, j, i] = values[name]
+    return matrix
+
+
+def _swap_sp(channels: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    swapped = dict(channels)
+    for name in swapped.keys() & {"Q", "U"}:
+        swapped[name] = -swapped[name]
+    if "aolp" in swapped:
+        swapped["aolp"] = conventions.aolp_swap_sp(swapped["aolp"])
+    if "mueller" in swapped:
+        swapped["mueller"] = conventions.mueller_swap_sp(swapped["mueller"])
+    return swapped
