@@ -11,6 +11,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 import pbrdf  # noqa: F401  before any test imports drjit: it tells Dr.Jit where LLVM is
+from pbrdf.models import MODELS
 
 # examples are drawn the same way every time; HYPOTHESIS_PROFILE=explore draws new ones and more of them
 settings.register_profile("suite", deadline=None, derandomize=True, database=None, max_examples=15)
@@ -81,3 +82,12 @@ def measured():
         return path
 
     return find
+
+
+@pytest.fixture(autouse=True)
+def models_as_before():
+    """A model that a test registers is known to that test alone."""
+    before = dict(MODELS._classes)
+    yield
+    MODELS._classes.clear()
+    MODELS._classes.update(before)

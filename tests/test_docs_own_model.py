@@ -12,16 +12,8 @@ from pbrdf.models import MODELS
 PAGE = Path(__file__).parents[1] / "docs" / "own-model.md"
 
 
-@pytest.fixture(autouse=True)
-def registry_as_before():
-    before = dict(MODELS._classes)
-    MODELS._classes.pop("lambert-ggx", None)
-    yield
-    MODELS._classes.clear()
-    MODELS._classes.update(before)
-
-
 def test_the_page_runs(tmp_path, monkeypatch, capsys):
+    MODELS._classes.pop("lambert-ggx", None)
     monkeypatch.chdir(tmp_path)
     blocks = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
     assert len(blocks) == 2

@@ -26,6 +26,7 @@ def test_a_bundled_paint(run, tmp_path, expected):
         "model.json",
         "fit.json",
         "comparison.nc",
+        "fit.nc",
     }
     record = json.loads((folder / "fit.json").read_text(encoding="utf-8"))
     for name, estimate in expected.estimates.items():

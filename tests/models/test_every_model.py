@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import inspect
+import pickle
 
 import drjit as dr
 import numpy as np
@@ -10,32 +12,15 @@ import pytest
 import xarray as xr
 
 import independent as ref
-from own_model import LambertGGX
+from every_model import EVERY, example
 from pbrdf.backend import get_backend
-from pbrdf.models import MODELS, Model
+from pbrdf.errors import ModelError
+from pbrdf.models import Model
 from pbrdf.models.realisability import least_coherency
 from pbrdf.models.reflectance import directional_hemispherical_reflectance
 
-EVERY = pytest.mark.parametrize("cls", [*MODELS.values(), LambertGGX], ids=lambda cls: cls.name)
 MIRROR = np.diag([1.0, 1.0, -1.0, -1.0])
 ANGLES = (np.array([0.1, 0.5, 1.1, 1.4]), np.array([0.4, 0.5, 0.2, 1.3]), np.array([0.0, 2.1, -0.7, 0.1]))
-
-
-def example(cls, seed=0, size=None):
-    """A model with parameters drawn within the bounds of a fit: numbers, or arrays."""
-    rng = np.random.default_rng(seed)
-    values = {}
-    for p in cls.parameters:
-        share = 0.1 + 0.8 * rng.random(size)
-        # an extinction of 0 half of the time: by structure where all are
-        absent = 0.0 if p.vanishing and seed % 2 == 0 else 1.0
-        if p.amplitude:
-            values[p.name] = share
-        elif p.logarithmic:
-            values[p.name] = p.lower * (p.upper / p.lower) ** share
-        else:
-            values[p.name] = absent * (p.lower + share * (p.upper - p.lower))
-    return cls(**values)
 
 
 def close(found, expected, tolerance=1e-12):
@@ -156,3 +141,57 @@ def test_the_declaration_makes_constructor_docstring_and_json(cls):
         cls()
     with pytest.raises(TypeError, match="unknown_one"):
         cls(**model.values, unknown_one=1.0)
+
+
+@EVERY
+def test_nothing_couples_i_q_with_u_v_in_the_plane_of_incidence(cls):
+    """At φ = 0 and π the matrix is block-diagonal, and the azimuth has the period 2π."""
+    model = example(cls, 1)
+    theta = np.array([0.1, 0.6, 1.2])
+    for phi in (0.0, np.pi):
+        f = model.mueller(theta[:, None], theta, phi)
+        f = f / f[..., :1, :1]
+        assert abs(f[..., :2, 2:]).max() < 1e-9 and abs(f[..., 2:, :2]).max() < 1e-9
+    close(model.mueller(0.5, 0.7, 0.3 + 2.0 * np.pi), model.mueller(0.5, 0.7, 0.3), 1e-9)
+
+
+@EVERY
+def test_stokes_is_the_matrix_times_the_incident_light(cls):
+    model = example(cls, 1)
+    light = np.array([1.0, 0.3, -0.4, 0.2])
+    close(model.stokes(*ANGLES, incident=light), model.mueller(*ANGLES) @ light)
+
+
+@EVERY
+def test_copies_are_equal_and_models_are_immutable(cls):
+    model = example(cls, 1)
+    for made in (copy.deepcopy(model), pickle.loads(pickle.dumps(model)), model.replace()):
+        assert made == model
+    name = cls.parameters[0].name
+    with pytest.raises(AttributeError, match="immutable"):
+        setattr(model, name, 1.0)
+    assert model.replace(**{name: cls.parameters[0].default}) != model
+
+
+@EVERY
+def test_values_outside_of_a_domain_are_named(cls):
+    model = example(cls, 1)
+    for p in cls.parameters:
+        for wrong in (np.nan, p.domain[0] - 1.0, *([p.domain[1] + 1.0] if np.isfinite(p.domain[1]) else [])):
+            with pytest.raises(ModelError, match=rf"^{p.name}=.* is outside its domain"):
+                model.replace(**{p.name: wrong})
+    with pytest.raises(ModelError, match="has no parameter or option"):
+        model.replace(no_such_parameter=1.0)
+
+
+@EVERY
+def test_single_precision_is_near_double(cls):
+    """The kernel of a renderer: float32 within 1e-4 of f00, away from grazing."""
+    model = example(cls, 3)
+    Float32 = dr.float32_array_t(get_backend().Float)
+    rng = np.random.default_rng(2)
+    angles = (*rng.uniform(0.0, 1.2, (2, 200)), rng.uniform(-np.pi, np.pi, 200))
+    matrix = model.mueller(*(Float32(a.astype(np.float32)) for a in angles))
+    exact = model.mueller(*(a.astype(np.float32).astype(float) for a in angles))
+    found = np.moveaxis(matrix.numpy(), -1, 0)
+    assert (np.abs(found - exact).max((1, 2)) / exact[:, 0, 0]).max() < 1e-4

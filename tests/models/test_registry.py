@@ -121,11 +121,3 @@ def test_a_declaration_that_cannot_be_is_an_error_of_the_program():
     ):
         with pytest.raises(TypeError, match=message):
             type("Wrong", (Model,), {"name": "wrong", "parameters": parameters})
-
-
-@pytest.fixture(autouse=True)
-def registry_as_before():
-    before = dict(MODELS._classes)
-    yield
-    MODELS._classes.clear()
-    MODELS._classes.update(before)

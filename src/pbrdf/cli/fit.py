@@ -153,7 +153,8 @@ def fit(
     """Fit a model to measured data, and say how well each parameter is known.
 
     Writes a folder with summary.txt, figure.png, model.json, fit.json (all numbers), comparison.nc
-    (measured, modelled, residual) and starts.png, and with --contour contours.png.
+    (measured, modelled, residual), fit.nc (all of the fit, for pbrdf.load_fit) and starts.png, and with
+    --contour contours.png.
 
     With bundled data: `pbrdf fit matte-white-thick --hold-out group=3`
 
