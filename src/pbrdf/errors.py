@@ -6,7 +6,7 @@ message alone, without a traceback; in Python it is a ``ValueError`` like any ot
 
 from __future__ import annotations
 
-__all__ = ["BackendError", "DataError", "FitError", "ModelError", "PbrdfError"]
+__all__ = ["BackendError", "DataError", "FitError", "ModelError", "PbrdfError", "PluginWarning"]
 
 
 class PbrdfError(ValueError):
@@ -27,3 +27,7 @@ class DataError(PbrdfError):
 
 class FitError(PbrdfError):
     """A fit was asked for that the data or the options do not allow."""
+
+
+class PluginWarning(UserWarning):
+    """A model or reader of an installed package cannot be used; the others can."""

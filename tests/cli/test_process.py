@@ -92,7 +92,9 @@ def test_a_reader_that_cannot_be_loaded_is_one_line_and_stops_nothing(tmp_path):
     (tmp_path / "guest-1.0.dist-info" / "METADATA").write_text(
         "Metadata-Version: 2.1\nName: guest\nVersion: 1\n"
     )
-    (tmp_path / "guest-1.0.dist-info" / "entry_points.txt").write_text("[pbrdf.readers]\nbad = no_module:R\n")
+    (tmp_path / "guest-1.0.dist-info" / "entry_points.txt").write_text(
+        "[pbrdf.readers]\nbad = no_module:R\n[pbrdf.models]\nworse = no_module:M\n"
+    )
     (tmp_path / "data.csv").write_text("theta_i,theta_r,brdf\n30,30,0.5\n")
     path = os.pathsep.join([str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])])
     for source in ("data.csv", "white"):
@@ -102,3 +104,9 @@ def test_a_reader_that_cannot_be_loaded_is_one_line_and_stops_nothing(tmp_path):
             "pbrdf: the reader 'bad' of the package guest cannot be loaded (ModuleNotFound"
         )
         assert done.stderr.count("\n") == 1
+    done = process("models", cwd=tmp_path, PYTHONPATH=path)
+    assert done.returncode == 0 and "double-gauss" in done.stdout
+    assert done.stderr.startswith(
+        "pbrdf: the model 'worse' of an installed package cannot be used (no_module:M)"
+    )
+    assert done.stderr.count("\n") == 1

@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 import pbrdf
 from pbrdf.cli.main import app
 from pbrdf.data import Reader, make_dataset, read, readers, register_reader, write
-from pbrdf.errors import DataError
+from pbrdf.errors import DataError, PluginWarning
 
 OWN = ["csv", "netcdf", "zarr", "scatmech", "cornell", "pbsdf", "merl"]
 DOCUMENT = Path(__file__).parents[2] / "docs" / "data-format.md"
@@ -243,9 +243,7 @@ def test_a_writer_of_others_gets_what_is_valid_and_its_mistakes_are_named(tmp_pa
 
 def test_a_reader_that_fails_to_recognise_a_file_does_not_stop_the_others(text_file):
     register_reader(Reader("bad", read_pairs, extensions=(".csv",), sniff=lambda path: 1 / 0))
-    with pytest.warns(
-        readers.ReaderWarning, match="the reader 'bad' fails to recognise it: ZeroDivisionError"
-    ):
+    with pytest.warns(PluginWarning, match="the reader 'bad' fails to recognise it: ZeroDivisionError"):
         assert_array_equal(read(text_file(TABLE))["I"], [0.5])
 
 
@@ -321,7 +319,7 @@ def test_a_broken_reader_is_named_and_does_not_stop_the_others(package, text_fil
     package(GUEST, f"{entry}\nnumbers = guest_formats:NUMBERS\n")
     name = entry.partition(" ")[0]
     words = rf"the reader '{name}' of the package guest cannot be loaded \({reason}\)"
-    with pytest.warns(readers.ReaderWarning, match=words) as caught:
+    with pytest.warns(PluginWarning, match=words) as caught:
         assert_array_equal(read(text_file(TABLE))["I"], [0.5])
     assert len(caught) == 1
     # once is enough

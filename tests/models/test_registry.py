@@ -11,7 +11,7 @@ import pytest
 import own_model
 import pbrdf
 from own_model import LambertGGX
-from pbrdf.errors import ModelError
+from pbrdf.errors import ModelError, PluginWarning
 from pbrdf.models import MODELS, DoubleGauss, Model, find_model, load_model, register
 from pbrdf.models.registry import ENTRY_POINTS, Registry
 
@@ -77,7 +77,7 @@ def test_a_broken_package_is_named_and_stops_nothing(tmp_path, monkeypatch):
     )
     monkeypatch.syspath_prepend(tmp_path)
     registry = Registry()
-    with pytest.warns(UserWarning) as warned:
+    with pytest.warns(PluginWarning) as warned:
         assert list(registry) == ["lambert-ggx"]
     said = [str(w.message) for w in warned]
     assert any("'broken'" in s and "no_such_module" in s for s in said)

@@ -8,6 +8,9 @@ from __future__ import annotations
 
 import errno
 import sys
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Annotated, Any
 
 import typer
@@ -15,7 +18,7 @@ from typer.core import TyperGroup
 
 from pbrdf.cli.calibrate import calibrate
 from pbrdf.cli.check import check
-from pbrdf.cli.console import fail
+from pbrdf.cli.console import fail, warn
 from pbrdf.cli.convert import convert
 from pbrdf.cli.doctor import doctor
 from pbrdf.cli.export import export
@@ -30,7 +33,7 @@ from pbrdf.cli.reduce import reduce
 from pbrdf.cli.render import render
 from pbrdf.cli.reproduce import reproduce
 from pbrdf.cli.simulate import simulate
-from pbrdf.errors import PbrdfError
+from pbrdf.errors import PbrdfError, PluginWarning
 from pbrdf.version import __version__
 
 __all__ = ["app", "main"]
@@ -44,7 +47,8 @@ class _Commands(TyperGroup):
 
     def invoke(self, ctx: Any) -> Any:
         try:
-            return super().invoke(ctx)
+            with _plugin_warnings_in_lines():
+                return super().invoke(ctx)
         except PbrdfError as error:
             fail(str(error))
         except OSError as error:
@@ -54,6 +58,22 @@ class _Commands(TyperGroup):
             named = f"{error.filename}: " if error.filename is not None else ""
             fail(f"{named}{error.strerror or error}")
         raise typer.Exit(USER_ERROR)
+
+
+@contextmanager
+def _plugin_warnings_in_lines() -> Iterator[None]:
+    """Show what is wrong with a model or reader of an installed package as one line."""
+    with warnings.catch_warnings():
+        show = warnings.showwarning
+
+        def show_one_line(message: Warning | str, category: type[Warning], *rest: Any, **more: Any) -> None:
+            if issubclass(category, PluginWarning):
+                warn(str(message))
+            else:
+                show(message, category, *rest, **more)
+
+        warnings.showwarning = show_one_line
+        yield
 
 
 app = typer.Typer(

@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 import re
-import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pbrdf.cli.console import warn
 from pbrdf.cli.values import number, pairs
 from pbrdf.errors import DataError, PbrdfError
 
@@ -87,16 +83,14 @@ class Reading:
                 options[name] = pairs(options[name], f"--{name}", example)
         if Path(source).exists():
             try:
-                with _warnings_in_lines():
-                    dataset = read(source, **options)
+                dataset = read(source, **options)
             except DataError as error:
                 raise DataError(_as_on_the_command_line(str(error))) from error
         elif source in PAINTS:
             if options:
                 given = ", ".join("--" + name.replace("_", "-") for name in options)
                 raise DataError(f"{source} is a bundled data set and needs no {given}: leave it out")
-            with _warnings_in_lines():
-                dataset = open_experiment(source)
+            dataset = open_experiment(source)
         else:
             names = f", and no bundled paint has that name; those are {', '.join(PAINTS)}"
             raise DataError(f"{source}: there is no such file{'' if Path(source).suffix else names}")
@@ -109,24 +103,6 @@ class Reading:
         if self.wavelength:
             selections.append(("wavelength", ",".join(f"{w:g}" for w in self.wavelength)))
         return selections
-
-
-@contextmanager
-def _warnings_in_lines() -> Iterator[None]:
-    """Show what is wrong with a reader of an installed package as one line."""
-    from pbrdf.data.readers import ReaderWarning
-
-    with warnings.catch_warnings():
-        show = warnings.showwarning
-
-        def show_one_line(message: Warning | str, category: type[Warning], *rest: Any, **more: Any) -> None:
-            if issubclass(category, ReaderWarning):
-                warn(str(message))
-            else:
-                show(message, category, *rest, **more)
-
-        warnings.showwarning = show_one_line
-        yield
 
 
 def _as_on_the_command_line(message: str) -> str:

@@ -16,14 +16,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pbrdf.data.formats.declaration import Reader
-from pbrdf.errors import DataError, PbrdfError
+from pbrdf.errors import DataError, PbrdfError, PluginWarning
 
 if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
     "GROUP",
-    "ReaderWarning",
     "format_names",
     "read",
     "register_reader",
@@ -45,10 +44,6 @@ _OWN = {
     "merl": "pbrdf.data.formats.merl",
 }
 _registered: dict[str, Reader] = {}
-
-
-class ReaderWarning(UserWarning):
-    """A reader of an installed package cannot be used; the other formats can."""
 
 
 def register_reader(reader: Reader) -> None:
@@ -219,7 +214,7 @@ def _sniffs(reader: Reader, path: Path) -> bool:
     except Exception as error:
         warnings.warn(
             f"{path}: the reader {reader.name!r} fails to recognise it: {_told(error)}",
-            ReaderWarning,
+            PluginWarning,
             stacklevel=5,
         )
         return False
@@ -277,7 +272,7 @@ def _installed() -> tuple[dict[str, Reader], dict[str, str]]:
             broken[entry.name] = (
                 f"the reader {entry.name!r}{package} cannot be loaded ({_told(error)}); repair or remove that package"
             )
-            warnings.warn(broken[entry.name], ReaderWarning, stacklevel=5)
+            warnings.warn(broken[entry.name], PluginWarning, stacklevel=5)
         else:
             readers[reader.name] = reader
     return readers, broken

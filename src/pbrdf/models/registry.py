@@ -18,7 +18,7 @@ from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import Any, TypeVar
 
-from pbrdf.errors import ModelError
+from pbrdf.errors import ModelError, PluginWarning
 from pbrdf.models.base import Model
 
 __all__ = ["ENTRY_POINTS", "MODELS", "Registry", "find_model", "load_model", "model_from_file", "register"]
@@ -83,6 +83,7 @@ class Registry(Mapping[str, type[Model]]):
             except Exception as error:
                 warnings.warn(
                     f"the model {entry.name!r} of an installed package cannot be used ({entry.value}): {error}",
+                    PluginWarning,
                     stacklevel=2,
                 )
 

@@ -285,7 +285,7 @@ def _nearer_edge_axes(geometry: Geometry, c_i: Any, c_r: Any) -> tuple[Any, ...]
     Returns
     -------
     (f, e), c_near, c_far, cos_d, sin_d
-        As :func:`pbrdf.optics.transport.transported_nodes` takes them.
+        As :func:`pbrdf.optics.transport.transported_rows` takes them.
     """
     cos_phi, sin_phi = -geometry.s_r[1], geometry.s_r[0]
     nearer_i = c_i <= c_r
