@@ -247,6 +247,7 @@ def small_fit():
     return pbrdf.fit(dataset.isel(geometry=tilted), fix=fix, starts=16)
 
 
+@pytest.mark.slow
 def test_ends_on_the_model_are_where_scipys_profile_crosses_the_threshold(small_fit):
     data, names = small_fit.data, small_fit.space.names
     rows = ["IQUV".index(c) for c in data.channels]
@@ -272,6 +273,7 @@ def test_ends_on_the_model_are_where_scipys_profile_crosses_the_threshold(small_
             np.testing.assert_allclose(2.0 * peer.cost - lowest, 3.8415, atol=4e-3)
 
 
+@pytest.mark.slow
 def test_contour_on_the_model_touches_its_profile_intervals(small_fit):
     """The lowest χ² along one parameter of the grid is that parameter's profile."""
     found = contour(small_fit, "t", "n", points=41)

@@ -191,6 +191,7 @@ def test_a_figure_of_a_model_needs_one_model_and_an_angle():
         model_figure(paint.replace(n=np.array([1.5, 1.6])), 30.0, "map")
 
 
+@pytest.mark.slow
 def test_figures_are_saved_alike_and_by_extension(figure, tmp_path):
     for kind in ("png", "svg"):
         save_figure(figure, tmp_path / f"a.{kind}")
