@@ -54,8 +54,9 @@ def jit():
     """Turn numbers or arrays into the active backend's float64 Dr.Jit array."""
     from pbrdf.backend import get_backend
 
-    Float = get_backend().Float
-    return lambda x: Float(np.atleast_1d(np.asarray(x, dtype=float)))
+    backend = get_backend()
+    # a copy of its own: the alignment of NumPy's memory would be part of the kernel, which is compiled anew for each
+    return lambda x: backend.upload(backend.Float, np.atleast_1d(np.asarray(x, dtype=float)))
 
 
 @pytest.fixture(scope="session")

@@ -168,6 +168,7 @@ class TestDrJitImportedBefore:
     def test_where_it_finds_nothing(self):
         self.check(FINDS_NOTHING)
 
+    @pytest.mark.slow
     def test_mitsuba(self):
         pytest.importorskip("mitsuba")
         self.check("import mitsuba as mi")
@@ -178,6 +179,7 @@ class TestDrJitImportedBefore:
         )
         assert "PaintedSurface[" in run.stdout
 
+    @pytest.mark.slow
     def test_a_variant_is_active(self):
         pytest.importorskip("mitsuba")
         before = "import mitsuba as mi; mi.set_variant('llvm_ad_mono_polarized')"

@@ -70,6 +70,7 @@ def setup(tmp_path):
 CALIBRATE = ("calibrate", "known", "-p", "nominal.toml", "-i", "inputs.csv")
 
 
+@pytest.mark.slow
 def test_calibrated_reductions_are_right_where_nominal_ones_are_not(run, tmp_path, setup):
     """Light of any polarisation: reduced as nominal it is wrong by what the instrument's errors make of it, calibrated
     it is right within the accuracy that the inputs held out have shown, which is the true one."""
@@ -116,6 +117,7 @@ def test_table_of_the_inputs(run, tmp_path, setup):
     assert float(rows["p000"]["intensity_dn"]) == pytest.approx(LEVEL, rel=0.03)
 
 
+@pytest.mark.slow
 def test_inputs_held_out_by_name(run, tmp_path, setup):
     """Series that only verify: with wrong light in the table they spoil the accuracy, not the vectors."""
     run(*CALIBRATE, "-o", "right.toml", "--hold-out", "p030,left", "-q")
@@ -129,6 +131,7 @@ def test_inputs_held_out_by_name(run, tmp_path, setup):
     assert use["left"] == "verified" and use["right"] == "calibrated"
 
 
+@pytest.mark.slow
 def test_an_accuracy_that_nothing_verifies_is_not_claimed(run, tmp_path, setup):
     """Four inputs are all needed: the nominal accuracy stays, with a warning. With one circular input V is verified
     with light that has none, which is said too."""
@@ -151,6 +154,7 @@ def test_an_accuracy_that_nothing_verifies_is_not_claimed(run, tmp_path, setup):
     assert "no circular input was held out" in result.stderr
 
 
+@pytest.mark.slow
 def test_tables_that_cannot_be_true_are_doubted(run, tmp_path, setup):
     """Two series exchanged contradict the readings. Angles counted clockwise do not, nor does left for right: they make
     another instrument, which is said."""
@@ -183,6 +187,7 @@ def test_bad_pixels_and_regions(run, tmp_path, setup):
     np.testing.assert_allclose(found.analyzer, scale * setup.analyzer, atol=0.003)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("option", [("--grid", "4x6"), ("--per-pixel",)])
 def test_maps_over_the_field(run, tmp_path, setup, option):
     """Retarders whose retardance changes over the field: the map reduces every corner right, nominal vectors do not."""
@@ -212,6 +217,7 @@ def test_maps_over_the_field(run, tmp_path, setup, option):
     assert abs(errors["nominal"]).max() > 0.04
 
 
+@pytest.mark.slow
 def test_settings_are_found(run, tmp_path, setup):
     """--parametric: axes, retardances, diattenuation and black level of a six-state imager, put into its file."""
     real = lcvr(
@@ -244,6 +250,7 @@ def test_settings_are_found(run, tmp_path, setup):
     np.testing.assert_allclose(vectors.analyzer, found.polarimeter.analyzer, atol=0.006)
 
 
+@pytest.mark.slow
 def test_a_mosaic_with_a_flat_field_that_is_not_natural(run, tmp_path):
     """A flat field of partly polarised light makes every reduction wrong. A calibration made with it takes that back,
     and is used in the same way as it was made."""

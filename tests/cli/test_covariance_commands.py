@@ -65,6 +65,7 @@ def test_covariances_survive_every_format(run, file, tmp_path):
     np.testing.assert_array_equal(pbrdf.read(tmp_path / "d.csv")["covariance"], third["covariance"])
 
 
+@pytest.mark.slow
 def test_a_fit_uses_them_unless_a_noise_is_stated(run, file, tmp_path):
     run("fit", "data.csv", "--starts", 4, "--hold-out", "group=3", "-q", "-o", "full")
     run("fit", "data.csv", "--starts", 4, "--hold-out", "group=3", "-q", "-o", "stated", "--noise", "1%,0")

@@ -14,6 +14,7 @@ def models(tmp_path):
     return blue, blue.replace(a=0.1)
 
 
+@pytest.mark.slow
 def test_a_table_for_mitsuba_tells_its_error_and_how_to_load_it(run, tmp_path, models):
     result = run(
         "export", "blue.json", "red.json", "--wavelength", 450, "--wavelength", 650, "-o", "paint.pbsdf"
@@ -63,6 +64,7 @@ def test_a_grid_over_the_hemisphere_is_there_without_options(run, tmp_path, mode
     assert "wavelength" not in ds.coords
 
 
+@pytest.mark.slow
 def test_a_merl_table_is_read_and_converted(run, tmp_path):
     assert run("export", "white", "--format", "merl").stdout.startswith(
         "white.binary: 1458000 cells of red, green and blue"

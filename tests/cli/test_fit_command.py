@@ -36,6 +36,7 @@ def test_a_bundled_paint(run, tmp_path, expected):
     assert " ".join(summary.split()) in " ".join(result.stdout.split())
 
 
+@pytest.mark.slow
 def test_every_option_reaches_the_fit(run, tmp_path):
     run("simulate", "cd-back", "--plane", "--theta-i", "30,50", "--theta-r=-80:80:8", "-o", "data.csv")
     arguments = ["--option", "shadowing=smith", "--fix", "n=1.7", "--fix", "t=0.5", "--free", "kappa"]
@@ -63,6 +64,7 @@ def test_every_option_reaches_the_fit(run, tmp_path):
     assert (tmp_path / "out" / "figure.svg").exists()
 
 
+@pytest.mark.slow
 def test_a_strangers_table(run, tmp_path):
     run("simulate", "cd-back", "--plane", "--theta-i", "30", "--theta-r", "0:80:4", "-o", "own.csv")
     rows = [line for line in (tmp_path / "own.csv").read_text().splitlines() if not line.startswith("#")]
@@ -85,6 +87,7 @@ def test_a_strangers_table(run, tmp_path):
     assert "The file has no azimuth" in result.stdout
 
 
+@pytest.mark.slow
 def test_a_model_file_is_one_of_the_starts(run, tmp_path):
     pbrdf.load_paint("white").to_json(tmp_path / "begin.json")
     run("fit", "white", "--model", "begin.json", "--starts", 1, "--quiet", "--output", "out")
@@ -93,6 +96,7 @@ def test_a_model_file_is_one_of_the_starts(run, tmp_path):
     assert record["estimates"]["sigma"]["value"] == pytest.approx(0.006, rel=0.01)
 
 
+@pytest.mark.slow
 def test_several_files_get_a_folder_each(run, tmp_path):
     result = run("fit", "white", "cd-back", "--starts", 1, "--quiet", "--output", "both")
     assert result.output.splitlines() == ["both/white", "both/cd-back"]
@@ -157,6 +161,7 @@ def test_an_unknown_option_is_named(run):
     assert "--starts" in result.output
 
 
+@pytest.mark.slow
 def test_checks_are_reported_and_recorded(run, tmp_path):
     """Plausibility and identifiability for every fit; intervals and folds where asked for."""
     result = run(
@@ -175,6 +180,7 @@ def test_checks_are_reported_and_recorded(run, tmp_path):
     assert [stage["name"] for stage in record["stages"]][-1] == "joint"
 
 
+@pytest.mark.slow
 def test_nuisance_terms_and_noise_of_an_instrument(run, tmp_path):
     """Angles of nuisance terms are in degrees on the command line and in the record."""
     run(
@@ -187,6 +193,7 @@ def test_nuisance_terms_and_noise_of_an_instrument(run, tmp_path):
     assert record["noise"].startswith("stated: instrument: 0.01")
 
 
+@pytest.mark.slow
 def test_joint_regions_are_drawn_where_asked_for(run, tmp_path):
     result = run("fit", "cd-back", *STARTS, "--contour", "t,n", "--contour", "a, k", "-o", "out")
     assert "contours.png" in result.stdout

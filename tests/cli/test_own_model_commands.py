@@ -37,6 +37,7 @@ def with_model(run, paint):
     return command
 
 
+@pytest.mark.slow
 def test_simulated_fitted_and_used_again(with_model, run, paint, tmp_path):
     angles = ("--theta-i", "20,50", "--theta-r", "0:75:5", "--phi", "0,180")
     with_model("simulate", "paint.json", *angles, "--noise", "0.01", "--seed", 2, "-o", "data.csv")
@@ -50,6 +51,7 @@ def test_simulated_fitted_and_used_again(with_model, run, paint, tmp_path):
     assert "lambert-ggx" in with_model("models").stdout
 
 
+@pytest.mark.slow
 def test_planned_measured_and_exported(with_model, tmp_path):
     limits = ("--smallest-bistatic", 30, "--largest-zenith", 70, "--budget", 12)
     assert "alpha" in with_model("plan", "paint.json", *limits, "-o", "next.csv").stdout
@@ -66,6 +68,7 @@ def test_planned_measured_and_exported(with_model, tmp_path):
     np.testing.assert_allclose(exported["mueller"].values[:, 0, 0], expected[:, 0, 0], rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_rendered(with_model, tmp_path):
     pytest.importorskip("mitsuba", reason="rendering needs mitsuba: pip install 'mitsuba>=3.9'")
     with_model("render", "paint.json", "--size", "24x24", "--spp", 4, "-o", "picture")

@@ -34,6 +34,7 @@ def test_a_plan_is_printed_and_written_with_a_picture(run, tmp_path):
     assert sorted(p.name for p in tmp_path.iterdir()) == ["next.csv", "next.png"]
 
 
+@pytest.mark.slow
 def test_a_plan_can_be_measured_and_fitted(run, tmp_path):
     """Out of plane, with a camera that is mounted askew: angles, reference angles and signs go through all files."""
     load_paint("matte-white-thick").to_json(tmp_path / "guess.json")
@@ -71,6 +72,7 @@ def test_a_measurement_is_a_folder_of_frames(run, tmp_path):
     assert (dataset["wavelength"].values == 476.0).all()
 
 
+@pytest.mark.slow
 def test_reduce_gives_the_same_data_as_measure(run, tmp_path):
     here = tmp_path / "virtual run"
     told = run("measure", "white", "--positions", 70, "--sample-angles", "30,55", "--patch", 5, "-o", here)

@@ -99,6 +99,7 @@ def arguments(frames, *more):
     return ("reduce", frames, "-p", "imager.toml", "--angles", "angles.csv", *ROI, *more)
 
 
+@pytest.mark.slow
 def test_from_frames_to_the_parameters_of_the_paint(run, tmp_path, setup):
     """Frames of a known paint, written as PNG, reduced and fitted by the command line: its parameters come back."""
     raw, names = setup
@@ -122,6 +123,7 @@ def test_from_frames_to_the_parameters_of_the_paint(run, tmp_path, setup):
     assert 0.6 < record["goodness"]["reduced_chi2"] < 1.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", ["folders", "stacks", "arrays", "npy", "tif", "nc", "zarr"])
 def test_every_kind_of_file_gives_the_same(run, tmp_path, setup, form):
     raw, names = setup
@@ -157,6 +159,7 @@ def test_every_kind_of_file_gives_the_same(run, tmp_path, setup, form):
     xr.testing.assert_equal(found, expected)
 
 
+@pytest.mark.slow
 def test_everything_that_is_written(run, tmp_path, setup):
     raw, _ = setup
     np.save(tmp_path / "run.npy", raw)

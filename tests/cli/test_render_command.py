@@ -22,6 +22,7 @@ def paint(tmp_path):
     return file.name
 
 
+@pytest.mark.slow
 def test_a_folder_holds_the_layers_and_the_pictures(run, tmp_path, paint):
     result = run("render", paint, *SMALL, "--polarizer", 90, "-o", "out")
     names = {path.name for path in (tmp_path / "out").iterdir()}
@@ -44,6 +45,7 @@ def test_one_file_has_one_figure_beside_it(run, tmp_path, paint):
     assert {path.name for path in tmp_path.iterdir()} == {"row.exr", "row.png", paint}
 
 
+@pytest.mark.slow
 def test_the_folder_of_a_fit_stands_for_its_model(run, tmp_path, paint):
     (tmp_path / "run").mkdir()
     (tmp_path / paint).rename(tmp_path / "run" / "model.json")
@@ -51,12 +53,14 @@ def test_the_folder_of_a_fit_stands_for_its_model(run, tmp_path, paint):
     assert (tmp_path / "fit.exr").is_file()
 
 
+@pytest.mark.slow
 def test_paints_on_a_cameras_scale_are_told(run):
     result = run("render", "white", "--light", "point", *SMALL)
     assert "white reflects 1.78 of the light it gets" in result.stderr
     assert "sphere-render/stokes.exr" in result.stdout
 
 
+@pytest.mark.slow
 def test_the_light_comes_from_where_it_is_said_to(run, tmp_path, paint):
     """A lamp at azimuth 0° stands on the right of the picture: there the ball is bright, and on its left dark."""
     from pbrdf.rendering.picture import read_exr
@@ -73,6 +77,7 @@ def test_the_light_comes_from_where_it_is_said_to(run, tmp_path, paint):
     assert brighter == {0: (True, False), 180: (False, True)}
 
 
+@pytest.mark.slow
 def test_a_scene_file_is_rendered_in_its_own_size(run, tmp_path, paint):
     (tmp_path / "scene.xml").write_text(
         """<scene version="3.0.0">
@@ -114,6 +119,7 @@ def test_what_cannot_be_rendered_is_one_line(refused, paint, arguments, message)
     assert message in refused("render", *(paint if a == "PAINT" else a for a in arguments))
 
 
+@pytest.mark.slow
 def test_a_map_of_parameters_covers_the_surface(run, tmp_path):
     """A model whose parameters are pictures: the plugin spreads them over the surface."""
     maps = {**PAINT, "parameters": {**PAINT["parameters"], "a": [[0.02, 0.02], [0.6, 0.6]]}}

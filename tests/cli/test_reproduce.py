@@ -6,6 +6,8 @@ import pytest
 from pbrdf.cli.reproduce import _noise
 from pbrdf.errors import PbrdfError
 
+pytestmark = pytest.mark.slow
+
 SMALL = ("--starts", 4, "--patch", 4)
 
 

@@ -62,6 +62,7 @@ def test_noise_has_the_stated_size_and_a_seed(run, tmp_path):
     np.testing.assert_allclose(a["I_std"], 0.01 * exact["I"], rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_fit_finds_a_simulated_model_again(run, tmp_path):
     truth = pbrdf.DoubleGauss(sigma=0.08, n=1.55, a=0.7, k=1.2, b=0.3, t=0.4)
     truth.to_json(tmp_path / "truth.json")

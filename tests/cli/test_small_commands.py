@@ -91,6 +91,7 @@ def test_a_file_is_converted(run, refused, tmp_path):
     assert "there is no folder" in refused("convert", "w.nc", "nowhere/w.nc")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("extension", ["png", "svg"])
 def test_a_model_and_data_are_drawn(run, tmp_path, extension):
     assert run("plot", "white", "--theta-i", "50", "-o", f"m.{extension}").stdout == f"m.{extension}\n"

@@ -36,6 +36,7 @@ def test_contour_thresholds_follow_f_where_the_scale_is_estimated(monkeypatch, m
     np.testing.assert_allclose(found.rises[0.9], expected)
 
 
+@pytest.mark.slow
 def test_contour_on_the_model_touches_its_profile_intervals(small_fit):
     """The lowest χ² along one parameter of the grid is that parameter's profile."""
     found = contour(small_fit, "t", "n", points=41)

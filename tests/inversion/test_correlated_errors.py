@@ -94,6 +94,7 @@ def monte_carlo(start, sets):
     return error / std, error.std(axis=0), 2.0 * solution.cost
 
 
+@pytest.mark.slow
 def test_standard_errors_with_the_covariance_are_right_and_smaller(truth, one, fitted):
     """400 measurements with correlated errors: with the covariance the errors are as large as stated, and smaller than
     with the standard uncertainties alone, whose stated errors are wrong."""

@@ -139,6 +139,7 @@ def test_runs_do_not_go_across_groups_and_zeros_are_left_out():
     assert residual_structure([]).p_sign == 1.0
 
 
+@pytest.mark.slow
 def test_chance_is_rarely_called_structure_and_a_wave_always():
     rng = np.random.default_rng(0)
     trials = [residual_structure(list(rng.standard_normal((3, 21)))).structured for _ in range(2000)]

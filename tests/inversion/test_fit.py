@@ -70,6 +70,7 @@ def bundled_fits():
     return {name: pbrdf.fit(pbrdf.open_experiment(name), starts=32) for name in pbrdf.PAINTS}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", list(pbrdf.PAINTS))
 def test_optimum_is_scipys_on_the_bundled_data(name, bundled_fits):
     result = bundled_fits[name]
@@ -180,6 +181,7 @@ def test_polarised_illumination_enters_the_model():
         assert result.estimates[name].value == pytest.approx(model.values[name], rel=1e-5)
 
 
+@pytest.mark.slow
 def test_standard_errors_are_the_scatter_of_repeated_measurements():
     model = pbrdf.load_paint("cd-back")
     angles = in_plane([30, 45], np.arange(-40, 70, 4))

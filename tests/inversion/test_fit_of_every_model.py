@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 import pbrdf
 from every_model import EVERY, example
@@ -24,6 +25,7 @@ def exact_data(model):
     )
 
 
+@pytest.mark.slow
 @EVERY
 def test_its_own_data_are_described_exactly_and_the_fit_comes_back(cls, tmp_path):
     pbrdf.register(cls)
@@ -37,6 +39,7 @@ def test_its_own_data_are_described_exactly_and_the_fit_comes_back(cls, tmp_path
     assert pbrdf.load_fit(tmp_path / "fit").model == result.model
 
 
+@pytest.mark.slow
 @EVERY
 def test_a_plan_is_made_for_it(cls):
     made = plan(example(cls), InstrumentNoise(linear=0.01, circular=0.05), 24, starts=1)

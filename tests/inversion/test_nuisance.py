@@ -204,6 +204,7 @@ def test_a_prior_and_the_data_combine_by_their_weights():
     assert both.value == pytest.approx(weights @ [data.value, 1.55] / weights.sum(), abs=0.3 * both.std)
 
 
+@pytest.mark.slow
 def test_outliers_move_a_robust_fit_less():
     theta_i, theta_r, group = protocol()
     ds = dataset(MODEL.stokes(*as_angles(theta_i, theta_r)), theta_i, theta_r, group)

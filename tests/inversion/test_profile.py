@@ -132,6 +132,7 @@ def test_a_better_optimum_on_the_way_is_reported(monkeypatch, measured):
     assert "better optimum" in found.notes[0]
 
 
+@pytest.mark.slow
 def test_ends_on_the_model_are_where_scipys_profile_crosses_the_threshold(small_fit):
     data, names = small_fit.data, small_fit.space.names
     rows = ["IQUV".index(c) for c in data.channels]

@@ -72,6 +72,7 @@ def test_the_choice_of_geometries_can_be_overridden():
         pbrdf.fit(dataset, starts=8, strategy="stepwise", diffuse_tilt=np.deg2rad(54.0))
 
 
+@pytest.mark.slow
 def test_steps_find_the_narrow_lobe_too():
     """For the smoothest paint most starts, joint or stepwise, end where the lobe is missed; the best do not."""
     dataset = pbrdf.open_experiment("white")

@@ -134,6 +134,7 @@ HARD = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["weighted-amplitude", "visible-flux", "reciprocal"])
 def test_high_accuracy_in_hard_geometries(kind):
     """What the tables do not hold, against the reference integrals of the tests: ≤ 1e-6 of f00."""

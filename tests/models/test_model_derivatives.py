@@ -49,6 +49,7 @@ def scale_of(derivative, f):
 
 
 # not every model in both modes: tracing and compiling a derivative takes seconds
+@pytest.mark.slow
 @pytest.mark.parametrize(("cls", "options"), [DEFAULT, OTHER])
 def test_forward_mode(cls, options):
     """Every parameter and angle, all sixteen elements: each lane moves one of them by the same ε."""
@@ -66,6 +67,7 @@ def test_forward_mode(cls, options):
     assert error.max() < 3e-7, LANES[worst]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("cls", "options"), [DEFAULT, RECIPROCAL])
 def test_reverse_mode(cls, options):
     """One sweep back from a weighted sum of all elements gives the gradient in every parameter and angle."""
@@ -112,6 +114,7 @@ def test_gradient_of_an_array_of_directions():
     assert sigma.grad.numpy()[0] == pytest.approx((high - low) / (2 * STEP), rel=2e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", [{}, {"normalization": "visible"}], ids=["weighted", "visible"])
 def test_gradients_are_finite_in_special_geometries(options):
     """Normal incidence, normal view, exact backscatter and mirror, grazing: no NaN in any derivative."""

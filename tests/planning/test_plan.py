@@ -220,6 +220,7 @@ def test_the_promised_errors_are_those_of_the_chosen_geometries():
     np.testing.assert_allclose(relative_errors(THICK, made.protocol), made.std / made.values, rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_more_readings_and_more_freedom_never_make_a_plan_worse():
     values = [plan(THICK, NOISE, budget, starts=2, **options) for budget, options in (
         (20, {"camera_positions": 2, "repeats": 4}),

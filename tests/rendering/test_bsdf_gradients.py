@@ -8,6 +8,8 @@ from bsdf_helpers import D, directions, interaction, light, turn, use, vector
 
 import pbrdf
 
+pytestmark = pytest.mark.slow
+
 PAINT = {"sigma": 0.1, "n": 1.62, "kappa": 0.4, "a": 0.9, "k": 1.25, "b": 0.3, "t": 0.6}
 
 

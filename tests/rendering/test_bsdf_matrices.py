@@ -48,6 +48,7 @@ def test_every_variant(variant, name):
     assert largest_difference(mi, model, 60 if variant in SCALAR else 5000) < TOLERANCE
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "choice"), CHOICES, ids=lambda c: c if isinstance(c, str) else "-".join(c.values())
 )
@@ -158,6 +159,7 @@ def test_matrices_are_realisable():
         assert np.min(lowest / M[:, 0, 0]) > -1e-6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("variant", ["scalar_spectral_polarized", "llvm_ad_mono_polarized", "llvm_ad_rgb"])
 def test_nothing_below_the_horizon(variant):
     """One-sided: 0 where either direction is at or below the horizon, whatever the accuracy."""
@@ -221,6 +223,7 @@ def test_importance_is_the_adjoint():
     np.testing.assert_allclose(adjoint, forward, rtol=1e-5, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_reciprocal_model_is_reciprocal():
     """Helmholtz: f(reversed path) = diag(1, 1, −1, 1) fᵀ diag(1, 1, −1, 1) in frames with x = s on both rays."""
     mi = use("llvm_ad_mono_polarized")

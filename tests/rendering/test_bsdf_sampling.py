@@ -206,6 +206,7 @@ def hemisphere_rule(zeniths=600, azimuths=128):
     return theta.ravel(), phi.ravel(), np.repeat(0.5 * w * math.pi / azimuths, azimuths)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("degrees", [0.0, 45.0, 75.0])
 @pytest.mark.parametrize(
     "surface", [{"sigma": 0.1}, {"sigma": 0.15, "k": 0.9, "kappa": 1.0}], ids=["paint", "metal"]
@@ -225,6 +226,7 @@ def test_mean_weight_is_the_reflectance_of_the_viewed_direction(surface, degrees
     assert np.all(np.abs(found - expected) < 4.0 * error + 2e-4 * expected[0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["DoubleGauss", "ReciprocalDoubleGauss"])
 @pytest.mark.parametrize("degrees", [20.0, 70.0])
 def test_mean_weight_of_importance_is_the_directional_hemispherical_reflectance(name, degrees):
@@ -250,6 +252,7 @@ def test_weights_are_bounded():
             assert weight.max() < 1.0 / 0.1
 
 
+@pytest.mark.slow
 def test_density_integrates_to_one_or_less():
     mi = use("llvm_ad_mono")
     theta, phi, w = hemisphere_rule()

@@ -86,6 +86,7 @@ class TestDictionary:
 
 
 class TestTextures:
+    @pytest.mark.slow
     @pytest.mark.parametrize("name", ["sigma", "n", "a", "k", "b", "t", "kappa"])
     def test_every_parameter_varies_over_the_surface(self, name):
         """A bitmap of four texels; the BRDF at each is that of the texel's number."""
@@ -108,6 +109,7 @@ class TestTextures:
         expected = expected_value(wi, wo, **{name: numbers[row, column]})
         np.testing.assert_allclose(found[:, 0], expected, rtol=TOLERANCE)
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("variant", ["llvm_ad_spectral", "llvm_ad_spectral_polarized", "scalar_spectral"])
     def test_spectra(self, variant):
         """Index, amplitude and extinction given over the wavelength, one value for each wavelength of a ray."""

@@ -6,12 +6,15 @@ import subprocess
 import sys
 
 import numpy as np
+import pytest
 
 import pbrdf
 import pbrdf.rendering
 from pbrdf.rendering.export import write_pbsdf
 from pbrdf.rendering.render import render_stokes
 from pbrdf.rendering.scenes import Camera
+
+pytestmark = pytest.mark.slow
 
 PAINT = pbrdf.DoubleGauss(sigma=0.1, n=1.6, a=0.3, k=1.2, b=0.3, t=0.6)
 CAMERA = Camera((0.0, -3.0, 1.1), (0.0, 0.0, 0.45), math.radians(24.0))

@@ -14,6 +14,8 @@ from pbrdf.optics.half_difference import directions
 from pbrdf.rendering.export import AIMS, UNSTATED_WAVELENGTH, grid_dataset, write_merl, write_pbsdf
 from pbrdf.rendering.tabulation import random_directions, refined_table
 
+pytestmark = pytest.mark.slow
+
 ROUGH = pbrdf.DoubleGauss(sigma=0.08, n=1.6, a=0.8, k=1.3, b=0.3, t=0.6)
 GLOSSY = ROUGH.replace(sigma=0.05)
 METAL = pbrdf.DoubleGauss(sigma=0.08, n=1.5 - 2.0j, a=0.4, k=1.2, b=-0.2, t=0.7)

@@ -12,6 +12,8 @@ import pbrdf
 import pbrdf.rendering
 from pbrdf.rendering.scenes import Camera
 
+pytestmark = pytest.mark.slow
+
 EXAMPLE = Path(__file__).parents[2] / "docs" / "examples" / "inverse_rendering.py"
 PAINT = pbrdf.DoubleGauss(sigma=0.08, n=1.6, a=0.3, k=1.2, b=0.2, t=0.6, accuracy="fast")
 

@@ -65,6 +65,7 @@ def test_pieces_of_the_panel_make_up_the_whole(panel):
     assert parts == pytest.approx(whole)
 
 
+@pytest.mark.slow
 def test_mitsuba_gets_the_same_mesh(mitsuba, panel):
     bsdf = mitsuba.load_dict({"type": "diffuse"})
     shape = panel.to_mitsuba("panel", bsdf)

@@ -49,6 +49,7 @@ def test_every_model_is_a_bsdf(cls):
     assert (np.abs(found - signs @ expected @ signs).max((1, 2)) / expected[:, 0, 0]).max() < 1e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("albedo", [0.0, 0.4])
 @pytest.mark.parametrize("degrees", [20.0, 65.0])
 def test_the_mean_weight_is_the_reflectance_though_the_tails_are_long(albedo, degrees):
@@ -108,6 +109,7 @@ def test_a_texture_and_a_scene():
     assert np.isfinite(picture).all() and picture.max() > 0.2
 
 
+@pytest.mark.slow
 def test_the_plain_table_of_mitsuba(tmp_path):
     """Export to ``measured_polarized`` knows the width of the lobe without a parameter of that name."""
     from pbrdf.data.formats.pbsdf import read_table

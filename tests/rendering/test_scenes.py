@@ -47,6 +47,7 @@ def test_every_scene_is_lit_by_every_light(mitsuba, environment, name, light):
     assert np.hypot(picture.stokes[1], picture.stokes[2]).max() > 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [1, 3])
 def test_the_car_is_painted_piece_by_piece(mitsuba, count):
     what = subject("car", [{**COAT, "alpha": 0.05 * (i + 1)} for i in range(count)], 1.5)

@@ -21,6 +21,8 @@ from pbrdf.rendering.scenes import Camera
 from pbrdf.rendering.variant import start_mitsuba
 from pbrdf.rendering.virtual_camera import exposure_for, picture_frames, pixel_dataset, pixel_geometry
 
+pytestmark = pytest.mark.slow
+
 PAINT = pbrdf.DoubleGauss(sigma=0.12, n=1.6, a=0.4, k=1.2, b=0.3, t=0.6)
 CAMERA = Camera((0.0, -3.0, 0.4), (0.0, 0.0, 0.0), math.radians(21.0))
 SIZE = (48, 48)

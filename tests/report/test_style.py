@@ -5,6 +5,7 @@ from pbrdf.report.fit.figure import fit_figure
 from pbrdf.report.style import DISTINCT_COLOURS, looks_of, save_figure
 
 
+@pytest.mark.slow
 def test_figures_are_saved_alike_and_by_extension(report, tmp_path):
     figure = fit_figure(report)
     for kind in ("png", "svg"):

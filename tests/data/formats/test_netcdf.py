@@ -12,6 +12,7 @@ from pbrdf.data.formats.netcdf import read_netcdf, write_netcdf
 from pbrdf.errors import DataError
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(ds=datasets())
 def test_round_trip_is_bit_for_bit(tmp_path, ds):

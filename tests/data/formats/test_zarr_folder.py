@@ -20,6 +20,7 @@ def ds():
     return make_dataset(np.deg2rad(30.0), 0.25, 0.0, quantity="brdf", I=1.0, group="φ1")
 
 
+@pytest.mark.slow
 @settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(ds=datasets())
 def test_round_trip_is_bit_for_bit(tmp_path, ds):

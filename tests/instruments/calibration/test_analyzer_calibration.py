@@ -59,6 +59,7 @@ def test_maps_are_calibrated_cell_by_cell():
     assert verify(found.polarimeter, intensities, INPUTS).linear < 1e-12
 
 
+@pytest.mark.slow
 def test_covariance_of_the_analyser_vectors():
     """Over 1000 noisy calibrations the scatter of W is its stated covariance, from given variances and from
     residuals."""

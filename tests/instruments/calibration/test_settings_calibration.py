@@ -104,6 +104,7 @@ def test_a_mosaic_has_settings_of_each_class_of_pixel():
     np.testing.assert_array_equal(found.polarimeter.mosaic, nominal.mosaic)
 
 
+@pytest.mark.slow
 def test_standard_errors_are_the_scatter():
     """40 noisy calibrations: values minus truth over standard errors have the variance 1 (all settings together, 5
     standard errors of a variance), and χ² is the number of readings less settings."""

@@ -114,6 +114,7 @@ def test_bias_of_the_estimators(snr):
     assert unbiased_dolp_squared(S, covariance).mean() / sigma**2 - snr**2 == pytest.approx(0, abs=error)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("psi", [0.0, 0.5, 1.2])
 def test_unequal_errors(psi):
     """Errors of q and u that differ by 2 and are correlated, at p = 4 σ: the plain degree is too high, by an amount

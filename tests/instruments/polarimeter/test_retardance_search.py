@@ -13,6 +13,7 @@ from pbrdf.instruments.polarimeter.retardance_search import search_retardances
 CRITERIA = ("equally_weighted_variance", "condition_2", "condition_frobenius", "determinant")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("criterion", CRITERIA)
 def test_the_search_reaches_the_best_there_is(criterion):
     """Four states without limits: √3, √20, EWV 10, det 0.19245 whatever the criterion, and not below."""
@@ -26,6 +27,7 @@ def test_the_search_reaches_the_best_there_is(criterion):
     np.testing.assert_allclose(lcvr(found.retardances).analyzer, found.polarimeter.analyzer)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("states", [5, 6, 8])
 def test_more_states(states):
     """N states reach 40/N; five cannot, for there is no spherical 2-design of five points (Mimura 1990): there the
@@ -37,6 +39,7 @@ def test_more_states(states):
         assert found == pytest.approx(40 / states, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_limits_are_kept_and_cost_something():
     """Retardances of 0…180° leave half of the Poincaré sphere (U ≥ 0) for retarders at 0° and 45°: √3 is out of reach.
     No random set within the limits is better than what is found."""

@@ -37,6 +37,7 @@ def frames():
     return ArrayFrames(raw, ("first", "second"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["nc", "zarr"])
 def test_what_was_found_is_read_back(tmp_path, frames, kind):
     if kind == "zarr":
@@ -78,6 +79,7 @@ def test_components_that_are_not_determined_have_no_variable(tmp_path, frames):
     assert not {"V", "cov_IV", "cov_VV", "docp", "docp_std"} & set(file.data_vars)
 
 
+@pytest.mark.slow
 def test_angles_stand_beside_the_series(tmp_path, frames):
     table = AngleTable(
         ("second", "first"), np.deg2rad([20.0, 10.0]), np.deg2rad([30.0, 40.0]), reference_angle=[np.nan, 0.0]

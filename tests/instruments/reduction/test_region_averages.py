@@ -120,6 +120,7 @@ def test_without_a_good_pixel_nothing_is_known():
     assert found.counts == {"good": 0, "saturated": 0, "dead": 3, "dark": 0}
 
 
+@pytest.mark.slow
 def test_covariance_of_the_mean_is_that_of_many_measurements():
     """4000 measurements of a region of 60 pixels: their means scatter as each of them says it does."""
     detector = Detector(bits=12, gain=2.0, read_noise=8.0, offset=100.0)

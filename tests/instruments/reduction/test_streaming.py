@@ -119,6 +119,7 @@ print((resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024)
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="peak memory is counted in other units elsewhere")
 @pytest.mark.parametrize("kind", ["npy", "nc"])
 def test_a_stack_larger_than_the_memory_allowed(tmp_path, kind):

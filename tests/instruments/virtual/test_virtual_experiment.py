@@ -99,6 +99,7 @@ def test_the_same_seed_gives_the_same_frames():
 # Errors are of the stated size
 
 
+@pytest.mark.slow
 def test_residuals_have_the_stated_covariance():
     """Mean χ² a degree of freedom over 20 measurements of 63 geometries: 1 ± 0.02."""
     total, count = 0.0, 0
@@ -258,6 +259,7 @@ def test_saturated_geometries_are_left_out_and_named():
 # The whole way
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PAINTS)
 def test_a_fit_of_the_virtual_data_finds_table_1(name):
     _, dataset = measured(VirtualExperiment(Protocol.in_plane(), PAPER, seed=11), name, load_paint(name))
@@ -269,6 +271,7 @@ def test_a_fit_of_the_virtual_data_finds_table_1(name):
             assert abs(estimate.value - truth) < 3.0 * estimate.std, parameter
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "instrument",
     [PAPER, preset("sony_imx250mzr"), replace(PAPER, polarimeter=lcvr(retardance_set("six_states")))],

@@ -11,6 +11,8 @@ from pbrdf.report.fit.contour_figure import contour_figure
 from pbrdf.report.fit.folder import write_report
 from pbrdf.report.fit.subject import Report
 
+pytestmark = pytest.mark.slow
+
 RISE = 5.991  # χ² with two degrees of freedom, 95 %
 
 

@@ -29,6 +29,7 @@ def drawn(tmp_path, names):
     return made.files
 
 
+@pytest.mark.slow
 def test_of_many_series_evenly_spread_ones_are_drawn(tmp_path, monkeypatch):
     monkeypatch.setattr(gallery, "_QUICKLOOKS", 2)
     monkeypatch.setattr(gallery, "_THUMBNAILS", 3)
@@ -51,6 +52,7 @@ def test_one_series_needs_no_overview(tmp_path):
     assert drawn(tmp_path, ("only one",)) == ["picture_only_one.png"]
 
 
+@pytest.mark.slow
 def test_names_that_a_file_cannot_have(tmp_path):
     assert drawn(tmp_path, ("a/b", "a:b")) == ["overview.png", "picture_a_b.png", "picture_a_b_2.png"]
 

@@ -171,6 +171,7 @@ def test_scales_are_stated_and_regions_named():
     assert aolp.get_xlim() == (0.0, 40.0)
 
 
+@pytest.mark.slow
 def test_an_overview_has_a_column_for_each_series(tmp_path):
     pictures = [picture_of(np.full((6, 8), angle)) for angle in np.linspace(-80.0, 80.0, 11)]
     figure = overview_figure(pictures, [f"s{k}" for k in range(11)], "all")
@@ -180,6 +181,7 @@ def test_an_overview_has_a_column_for_each_series(tmp_path):
     assert (tmp_path / "overview.png").stat().st_size > 1000
 
 
+@pytest.mark.slow
 def test_a_picture_without_a_good_pixel_can_be_drawn(tmp_path):
     nothing = np.full((4, 5), np.nan)
     picture = Picture(nothing, nothing, nothing, nothing, np.ones((4, 5), int), (4, 5), 1)

@@ -84,6 +84,7 @@ def test_views_through_polarisers_share_a_scale(picture):
     assert both == pytest.approx(picture.stokes[0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("channel", ["s0", "dolp", "aolp", "s1", "s2", "s3"])
 def test_a_dark_picture_can_be_drawn(channel, tmp_path):
     dark = StokesPicture(np.zeros((4, 5, 6)), np.zeros((4, 5, 6)))

@@ -15,6 +15,8 @@ from pbrdf.reproduction.page.tables import recovered
 from pbrdf.reproduction.paper import SAMPLES, SIMULATED
 from pbrdf.reproduction.statements.parameters import agreement
 
+pytestmark = pytest.mark.slow
+
 NOISELESS = Options(
     bits=16, linear=1e-6, circular=1e-6, read_noise=0.0, stability=1e-6, calibration_error="none", patch=4
 )

@@ -70,6 +70,7 @@ def test_points_without_polarisation_do_not_count():
     assert degree.largest == pytest.approx(0.01)
 
 
+@pytest.mark.slow
 def test_the_sample_of_the_run_agrees_with_its_table(samples):
     """The errors of sample 3 at the peak of position 3, the predicted one, are within the imager's accuracy."""
     errors = position_errors(samples[2])[2]

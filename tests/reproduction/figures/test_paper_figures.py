@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import matplotlib.image
 import numpy as np
+import pytest
 
 from pbrdf.report.style import save_figure
 from pbrdf.reproduction.figures.all import pictures
@@ -11,6 +12,8 @@ from pbrdf.reproduction.figures.angles import dop_figure, intensity_figure
 from pbrdf.reproduction.figures.errors import dop_error_figure, intensity_error_figure
 from pbrdf.reproduction.figures.polar import polar_figure, polar_surface
 from pbrdf.reproduction.paper import SIMULATED
+
+pytestmark = pytest.mark.slow
 
 
 def texts(figure):

@@ -14,6 +14,8 @@ from pbrdf.reproduction.page.page import verdicts_in_words
 from pbrdf.reproduction.paper import SAMPLES, SIMULATED
 from pbrdf.reproduction.run import write_reproduction
 
+pytestmark = pytest.mark.slow
+
 TABLES = {
     "errors.csv",
     "errors-at-strongest-points.csv",

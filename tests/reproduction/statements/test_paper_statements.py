@@ -34,6 +34,7 @@ CONTRADICTED = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("interpretation", INTERPRETATIONS, ids=lambda r: r.name)
 def test_each_interpretation_contradicts_these_statements_and_no_others(reproduction, interpretation):
     tested = {e.statement.number: e for e in reproduction.statements if interpretation.name in e.outcomes}
@@ -48,6 +49,7 @@ def test_the_default_is_the_interpretation_that_contradicts_least():
     assert min(CONTRADICTED, key=lambda name: len(CONTRADICTED[name])) == DEFAULT.name
 
 
+@pytest.mark.slow
 def test_every_statement_is_listed_once_and_those_about_measured_data_are_not_tested(reproduction):
     assert [s.number for s in STATEMENTS] == list(range(1, 29))
     for entry in reproduction.statements:
@@ -59,6 +61,7 @@ def test_every_statement_is_listed_once_and_those_about_measured_data_are_not_te
     assert on_parameters[25] == {RECOVERED}
 
 
+@pytest.mark.slow
 def test_table_1_obeys_the_statements_on_parameters(reproduction):
     for entry in reproduction.statements:
         if PRINTED in entry.outcomes:
@@ -184,6 +187,7 @@ def test_25_a_start_without_an_end_does_not_agree():
     assert not starts_agree([stub([10.0, np.inf], [0.1, 0.2])]).passed
 
 
+@pytest.mark.slow
 def test_evaluation_tells_how_far_it_is(reproduction, positions, monkeypatch):
     monkeypatch.setattr("pbrdf.reproduction.statements.catalogue.STATEMENTS", STATEMENTS[4:8])
     calls = []

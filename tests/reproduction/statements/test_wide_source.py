@@ -11,6 +11,8 @@ from pbrdf.reproduction.interpretations import DEFAULT
 from pbrdf.reproduction.plane import in_plane
 from pbrdf.reproduction.statements.wide_source import RADIUS, errors_at_peaks, wide_source_explains_the_peaks
 
+pytestmark = pytest.mark.slow
+
 
 def test_a_point_source_leaves_no_error(positions):
     np.testing.assert_allclose(errors_at_peaks(DEFAULT, positions, 0.0), 0.0, atol=1e-6)
