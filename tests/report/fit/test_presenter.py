@@ -24,6 +24,7 @@ def test_print_shows_the_summary_of_the_command(result):
     assert result.summary() == expected
     assert str(result) == expected.rstrip()
     assert "Determined" in str(result) and "double-gauss" in str(result)
+    assert str(result).count(name) == 1
     assert len(result.summary(verbose=True)) > len(expected)
 
 

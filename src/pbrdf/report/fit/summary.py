@@ -183,7 +183,7 @@ def _heading(report: Report) -> list[tuple[str, list[str]]]:
         f"{wavelengths_in_words(ds)}, {illumination_in_words(ds)}"
     )
     rows = [
-        ("Fitted to", [report.name + (f" ({title})" if title else "")]),
+        ("Fitted to", [report.name + (f" ({title})" if title and title != report.name else "")]),
         ("Model", [", ".join([model.name, *options])]),
         ("Data", [data + ("; simulated, not measured" if ds.attrs.get("simulated") else "")]),
         ("Noise", [result.noise]),
