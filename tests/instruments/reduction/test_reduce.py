@@ -186,3 +186,8 @@ def test_a_file_that_is_there_is_kept(frames, tmp_path):
     with pytest.raises(DataError, match=r"stokes\.nc: there is something of that name already"):
         reduce(frames, INSTRUMENT, [MapWriter(path, frames, INSTRUMENT)])
     assert path.read_text() == "mine"
+
+
+def test_without_a_sink_nothing_is_read(frames):
+    with pytest.raises(DataError, match="give at least one sink"):
+        reduce(frames, INSTRUMENT, [])

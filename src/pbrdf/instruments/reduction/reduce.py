@@ -11,6 +11,7 @@ from contextlib import ExitStack, closing
 from types import TracebackType
 from typing import Any, Protocol, TypeVar
 
+from pbrdf.errors import DataError
 from pbrdf.instruments.frames.frames import Frames
 from pbrdf.instruments.polarimeter.instrument import Instrument
 from pbrdf.instruments.reduction.streaming import DEFAULT_MEMORY, Block, reduced_blocks
@@ -83,8 +84,13 @@ def reduce(
     Raises
     ------
     DataError
-        If the frames do not fit the instrument, or it does not determine the intensity; names the series.
+        If there is no sink, the frames do not fit the instrument, or it does not determine the intensity; names the
+        series.
     """
+    if not sinks:
+        raise DataError(
+            "reduce: nothing would be kept; give at least one sink, for example a RegionCollector"
+        )
 
     def prepare(block: Block) -> tuple[Block, list[Any]]:
         return block, [sink.prepare(block) for sink in sinks]
