@@ -96,6 +96,7 @@ def test_truth_lies_within_the_standard_errors(name, bundled_fits):
     assert 0.7 < result.goodness.reduced_chi2 < 1.3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("wavelength", [460.0, 550.0])
 def test_optimum_is_scipys_on_krylon(wavelength):
     path = SHARED / "krylon" / "krylon_blue.brdf"
