@@ -68,5 +68,5 @@ def test_the_page_draws_every_floor_and_names_files_that_are_there():
     there = {path.stem for path in PACKAGE.iterdir() if path.is_dir() or path.suffix == ".py"}
     assert there - {"__init__", "__pycache__"} <= drawn
     named = re.findall(r"`((?:\w+/)+[a-z_]+\.py)`", text.split("## Where a change goes")[1])
-    assert len(named) > 10
+    assert len(named) > 5
     assert [name for name in named if not (PACKAGE / name).is_file()] == []
