@@ -1,9 +1,17 @@
-"""What the contracts in ``pyproject.toml`` cannot say of the imports inside the package."""
+"""What the contracts in ``pyproject.toml`` cannot say of the imports inside the package, and the page that draws it."""
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import grimp
 import pytest
+
+import pbrdf
+
+PACKAGE = Path(pbrdf.__file__).parent
+PAGE = Path(__file__).parents[1] / "docs" / "architecture.md"
 
 
 @pytest.fixture(scope="module")
@@ -52,3 +60,13 @@ def test_no_circle_of_files(graph):
 
 def test_nothing_inside_imports_the_front_door(graph):
     assert graph.find_modules_that_directly_import("pbrdf") == set()
+
+
+def test_the_page_draws_every_floor_and_names_files_that_are_there():
+    text = PAGE.read_text(encoding="utf-8")
+    drawn = set(re.findall(r"\w+", " ".join(line[:17] for line in text.split("```")[1].splitlines())))
+    there = {path.stem for path in PACKAGE.iterdir() if path.is_dir() or path.suffix == ".py"}
+    assert there - {"__init__", "__pycache__"} <= drawn
+    named = re.findall(r"`((?:\w+/)+[a-z_]+\.py)`", text.split("## Where a change goes")[1])
+    assert len(named) > 5
+    assert [name for name in named if not (PACKAGE / name).is_file()] == []
