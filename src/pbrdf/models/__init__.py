@@ -4,15 +4,25 @@ from __future__ import annotations
 
 from pbrdf.models.base import Model
 from pbrdf.models.double_gauss import DoubleGauss, ReciprocalDoubleGauss
+from pbrdf.models.microfacet import (
+    CookTorranceLambert,
+    GeneralisedGaussianMRPV,
+    GGXLambert,
+    PriestGermer,
+)
 from pbrdf.models.parameters import Option, Parameter
 from pbrdf.models.registry import MODELS, find_model, load_model, register
 
 __all__ = [
     "MODELS",
+    "CookTorranceLambert",
     "DoubleGauss",
+    "GGXLambert",
+    "GeneralisedGaussianMRPV",
     "Model",
     "Option",
     "Parameter",
+    "PriestGermer",
     "ReciprocalDoubleGauss",
     "find_model",
     "load_model",
@@ -21,3 +31,7 @@ __all__ = [
 
 register(DoubleGauss)
 register(ReciprocalDoubleGauss)
+register(CookTorranceLambert)
+register(PriestGermer)
+register(GGXLambert)
+register(GeneralisedGaussianMRPV)

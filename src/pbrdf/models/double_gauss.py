@@ -42,6 +42,7 @@ __all__ = [
     "SLOPE",
     "DoubleGauss",
     "ReciprocalDoubleGauss",
+    "check_index",
     "specular_reflection",
 ]
 
@@ -101,6 +102,15 @@ def specular_reflection(geometry: Geometry, sigma: Any, n: Any, kappa: Any | Non
     return facet_reflection(geometry, density, SHADOWING[shadowing](geometry, sigma), n, kappa)
 
 
+def check_index(n: Any, kappa: Any, names: tuple[str, str] = ("n", "kappa")) -> None:
+    """Check that a dielectric is denser than air; raises ModelError."""
+    n, kappa = to_numpy(n), to_numpy(kappa)
+    if n is not None and kappa is not None and ((n < 1.0) & (kappa == 0.0)).any():
+        raise ModelError(
+            f"{names[0]} must be at least 1 where {names[1]} is 0: the coating is denser than air"
+        )
+
+
 class _GaussianFacets(Model):
     """What both models share: Gaussian facets on a coating of index n − iκ over a body of the MRPV shape."""
 
@@ -146,9 +156,7 @@ class _GaussianFacets(Model):
         return facets, math.pi * body
 
     def _check_together(self) -> None:
-        n, kappa = to_numpy(self.values["n"]), to_numpy(self.values["kappa"])
-        if n is not None and kappa is not None and ((n < 1.0) & (kappa == 0.0)).any():
-            raise ModelError("n must be at least 1 where kappa is 0: the coating is denser than air")
+        check_index(self.values["n"], self.values["kappa"])
 
 
 class DoubleGauss(_GaussianFacets):

@@ -1,7 +1,7 @@
 """Bodies of one formula that depolarise completely: Lambert's, and the modified Rahman-Pinty-Verstraete function.
 
-Sources: ``Lambert``: f = ρ/π (Lambert 1760). ``MRPV``: Martonchik et al. (1998), the shape of the double-Gauss's diffuse
-part, see :mod:`pbrdf.optics.diffuse`.
+Sources: ``Lambert``: f = ρ/π (Lambert 1760). ``MRPV``: Martonchik et al. (1998), the shape of the double-Gauss's
+diffuse part, see :mod:`pbrdf.optics.diffuse`.
 """
 
 from __future__ import annotations
