@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from pbrdf.models.base import Model
+from pbrdf.models.coherent import MirrorFacetsMRPV
 from pbrdf.models.double_gauss import DoubleGauss, ReciprocalDoubleGauss
+from pbrdf.models.hyde import HydeType
 from pbrdf.models.microfacet import (
     CookTorranceLambert,
     GeneralisedGaussianMRPV,
@@ -12,13 +14,17 @@ from pbrdf.models.microfacet import (
 )
 from pbrdf.models.parameters import Option, Parameter
 from pbrdf.models.registry import MODELS, find_model, load_model, register
+from pbrdf.models.two_lobes import DoubleGaussTwoLobes
 
 __all__ = [
     "MODELS",
     "CookTorranceLambert",
     "DoubleGauss",
+    "DoubleGaussTwoLobes",
     "GGXLambert",
     "GeneralisedGaussianMRPV",
+    "HydeType",
+    "MirrorFacetsMRPV",
     "Model",
     "Option",
     "Parameter",
@@ -33,5 +39,8 @@ register(DoubleGauss)
 register(ReciprocalDoubleGauss)
 register(CookTorranceLambert)
 register(PriestGermer)
+register(HydeType)
 register(GGXLambert)
 register(GeneralisedGaussianMRPV)
+register(DoubleGaussTwoLobes)
+register(MirrorFacetsMRPV)
