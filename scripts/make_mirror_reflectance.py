@@ -15,7 +15,7 @@ import numpy as np
 from numpy.polynomial import chebyshev, legendre
 
 #: Degrees in the mapped angle and in σ; largest σ; scale of the map.
-DEGREES, LARGEST, SCALE = (14, 8), 0.6, 2.0
+DEGREES, LARGEST, SCALE = (14, 12), 1.0, 2.0
 #: Standard deviations of slope that the integral reaches to.
 REACH = 8.0
 
@@ -50,7 +50,7 @@ def reflectance(sigma: float, tan_theta: float) -> float:
 
 
 def grid(angles: int, sigmas: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Mapped angles z, σ/0.6 and the reflectance on Chebyshev nodes, z = σ tanθ/(σ tanθ + ½)."""
+    """Mapped angles z, σ and the reflectance on Chebyshev nodes, z = σ tanθ/(σ tanθ + ½)."""
     z = 0.5 * (1.0 - np.cos((np.arange(angles) + 0.5) * np.pi / angles))
     s = 0.5 * (1.0 - np.cos((np.arange(sigmas) + 0.5) * np.pi / sigmas))
     values = [[reflectance(LARGEST * b, a / (1.0 - a) / (SCALE * LARGEST * b)) for b in s] for a in z]
@@ -58,7 +58,7 @@ def grid(angles: int, sigmas: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def basis(z: np.ndarray, s: np.ndarray) -> np.ndarray:
-    """Products of Chebyshev polynomials, shape (points, 15·9)."""
+    """Products of Chebyshev polynomials, shape (points, 15·13)."""
     first, second = (
         chebyshev.chebvander(2.0 * u - 1.0, degree) for u, degree in zip((z, s), DEGREES, strict=True)
     )
@@ -69,7 +69,7 @@ def main() -> None:
     z, s, values = grid(44, 24)
     coefficients = np.round(np.linalg.lstsq(basis(z, s), values, rcond=None)[0], 6)
     for row in coefficients.reshape(DEGREES[0] + 1, -1):
-        print("    (" + ", ".join(f"{c:g}" for c in row) + "),")
+        print("    (" + ", ".join(f"{c + 0.0:g}" for c in row) + "),")
     z, s, values = grid(61, 17)
     print(f"largest error {np.abs(basis(z, s) @ coefficients - values).max():.1e}")
 

@@ -20,7 +20,7 @@ class HydeType(ComposedModel):
 
     A reconstruction from the abstract of Hyde, Schmidt and Havrilla (2009), not verified against the paper: the
     magnitude of the body follows from energy conservation for a perfect conductor. Not reciprocal (the body depends
-    on θ_i alone). Conserves energy: exactly 1 for a perfect conductor, within 1e-3; σ up to 0.6.
+    on θ_i alone). Conserves energy: a perfect conductor reflects 1 at every θ_i, to 1e-3.
     """
 
     name: ClassVar[str] = "hyde-type"

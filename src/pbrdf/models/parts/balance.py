@@ -8,13 +8,12 @@ from typing import Any
 
 import drjit as dr
 
-from pbrdf.errors import ModelError
-from pbrdf.models.arrays import Matrix, to_numpy
+from pbrdf.models.arrays import Matrix
 from pbrdf.models.double_gauss import EXTINCTION, INDEX, SLOPE
 from pbrdf.models.parts.part import Part, depolarising
 from pbrdf.optics.fresnel import mueller_reflection
 from pbrdf.optics.geometry import Geometry
-from pbrdf.optics.mirror_reflectance import LARGEST_SIGMA, mirror_reflectance
+from pbrdf.optics.mirror_reflectance import mirror_reflectance
 
 __all__ = ["EnergyBalance"]
 
@@ -32,14 +31,6 @@ class EnergyBalance(Part):
 
     def matrix(self, geometry: Geometry, values: Mapping[str, Any], chosen: Mapping[str, str]) -> Matrix:
         return depolarising(self._reflectance(geometry.cos_i, geometry.sin_i, values) * (1.0 / math.pi))
-
-    def check(self, values: Mapping[str, Any]) -> None:
-        sigma = to_numpy(values["sigma"])
-        if sigma is not None and (sigma > LARGEST_SIGMA).any():
-            raise ModelError(
-                f"sigma={sigma.max():g}: at most {LARGEST_SIGMA:g} in a model that balances its energy, whose table of "
-                "the facets' reflectance ends there"
-            )
 
     def albedo(self, cos_theta: Any, values: Mapping[str, Any]) -> Any:
         sin_theta = dr.sqrt(dr.maximum(1.0 - cos_theta * cos_theta, 0.0))
