@@ -114,10 +114,10 @@ def test_reflectance_agrees_with_brute_force(cls):
     """∫ f00 cosθ_r dω_r over a fine grid of directions, which knows nothing of lobes."""
     model = example(cls, 3)
     theta = ((np.arange(1200) + 0.5) * 0.5 * np.pi / 1200)[:, None]
-    phi = (np.arange(360) + 0.5) * np.pi / 360
+    phi = (np.arange(720) + 0.5) * np.pi / 720
     for theta_i in (0.0, 0.6, 1.0):
         f = model.stokes(theta_i, theta, phi)[..., 0]
-        brute = (f * np.cos(theta) * np.sin(theta)).sum() * (0.5 * np.pi / 1200) * (2.0 * np.pi / 360)
+        brute = (f * np.cos(theta) * np.sin(theta)).sum() * (0.5 * np.pi / 1200) * (2.0 * np.pi / 720)
         assert directional_hemispherical_reflectance(model, theta_i) == pytest.approx(brute, rel=2e-3)
 
 

@@ -3,16 +3,32 @@
 from __future__ import annotations
 
 from pbrdf.models.base import Model
+from pbrdf.models.coherent import MirrorFacetsMRPV
 from pbrdf.models.double_gauss import DoubleGauss, ReciprocalDoubleGauss
+from pbrdf.models.hyde import HydeType
+from pbrdf.models.microfacet import (
+    CookTorranceLambert,
+    GeneralisedGaussianMRPV,
+    GGXLambert,
+    PriestGermer,
+)
 from pbrdf.models.parameters import Option, Parameter
 from pbrdf.models.registry import MODELS, find_model, load_model, register
+from pbrdf.models.two_lobes import DoubleGaussTwoLobes
 
 __all__ = [
     "MODELS",
+    "CookTorranceLambert",
     "DoubleGauss",
+    "DoubleGaussTwoLobes",
+    "GGXLambert",
+    "GeneralisedGaussianMRPV",
+    "HydeType",
+    "MirrorFacetsMRPV",
     "Model",
     "Option",
     "Parameter",
+    "PriestGermer",
     "ReciprocalDoubleGauss",
     "find_model",
     "load_model",
@@ -21,3 +37,10 @@ __all__ = [
 
 register(DoubleGauss)
 register(ReciprocalDoubleGauss)
+register(CookTorranceLambert)
+register(PriestGermer)
+register(HydeType)
+register(GGXLambert)
+register(GeneralisedGaussianMRPV)
+register(DoubleGaussTwoLobes)
+register(MirrorFacetsMRPV)
