@@ -50,6 +50,10 @@ class ComposedModel(Model):
                 total = added(total, own.matrix(geometry, values, self.chosen))
         return total
 
+    def _check_together(self) -> None:
+        for part in self.parts:
+            part.check(self.values)
+
     def lobe_width(self, values: Mapping[str, Any] | None = None) -> Any:
         """That of the first part that has a lobe and knows its width; else measured."""
         given = self.values if values is None else values

@@ -31,39 +31,51 @@ from pbrdf.optics.transmission import (
     exit_polarisation,
 )
 
-__all__ = ["DoubleGauss", "ReciprocalDoubleGauss", "specular_reflection"]
+__all__ = [
+    "AMPLITUDE",
+    "ASYMMETRY",
+    "EXTINCTION",
+    "INDEX",
+    "MEAN_COSINE",
+    "MINNAERT",
+    "POLARISED_SHARE",
+    "SLOPE",
+    "DoubleGauss",
+    "ReciprocalDoubleGauss",
+    "check_index",
+    "specular_reflection",
+]
 
 _INFINITY = float("inf")
 
-_PARAMETERS = (
-    Parameter(
-        "sigma", "σ", "1", "standard deviation of one slope component of the facets",
-        0.002, 0.6, (0.001, 1.0), 0.04, logarithmic=True, part="specular",
-    ),
-    Parameter(
-        "n", "n", "1", "real refractive index of the coating",
-        1.2, 2.6, (0.01, 100.0), 1.6, part="specular",
-    ),
-    Parameter(
-        "kappa", "κ", "1", "extinction of the coating's index n − iκ, 0 for a dielectric",
-        0.0, 5.0, (0.0, 100.0), 0.0, fitted=False, part="specular", vanishing=True, extinction_of="n",
-    ),
-    Parameter(
-        "a", "a", "1", "diffuse amplitude, on the data's own scale",
-        1e-4, 100.0, (0.0, _INFINITY), 1.0, logarithmic=True, part="diffuse", amplitude=True,
-    ),
-    Parameter(
-        "k", "k", "1", "Minnaert-type exponent, 1 for a Lambertian body",
-        0.3, 4.0, (0.0, 20.0), 1.2, part="diffuse",
-    ),
-    Parameter(
-        "b", "b", "1", "forward (> 0) or backward (< 0) asymmetry",
-        -3.0, 4.0, (-20.0, 20.0), 0.0, part="diffuse",
-    ),
-    Parameter(
-        "t", "t", "1", "polarised share of the diffuse part",
-        0.0, 1.0, (0.0, 1.0), 0.5, part="diffuse",
-    ),
+# The parameters, which other models of Gaussian facets or of the same body share
+SLOPE = Parameter(
+    "sigma", "σ", "1", "standard deviation of one slope component of the facets",
+    0.002, 0.6, (0.001, 1.0), 0.04, logarithmic=True, part="specular",
+)  # fmt: skip
+INDEX = Parameter(
+    "n", "n", "1", "real refractive index of the coating",
+    1.2, 2.6, (0.01, 100.0), 1.6, part="specular",
+)  # fmt: skip
+EXTINCTION = Parameter(
+    "kappa", "κ", "1", "extinction of the coating's index n − iκ, 0 for a dielectric",
+    0.0, 5.0, (0.0, 100.0), 0.0, fitted=False, part="specular", vanishing=True, extinction_of="n",
+)  # fmt: skip
+AMPLITUDE = Parameter(
+    "a", "a", "1", "diffuse amplitude, on the data's own scale",
+    1e-4, 100.0, (0.0, _INFINITY), 1.0, logarithmic=True, part="diffuse", amplitude=True,
+)  # fmt: skip
+MINNAERT = Parameter(
+    "k", "k", "1", "Minnaert-type exponent, 1 for a Lambertian body",
+    0.3, 4.0, (0.0, 20.0), 1.2, part="diffuse",
+)  # fmt: skip
+ASYMMETRY = Parameter(
+    "b", "b", "1", "forward (> 0) or backward (< 0) asymmetry",
+    -3.0, 4.0, (-20.0, 20.0), 0.0, part="diffuse",
+)  # fmt: skip
+POLARISED_SHARE = Parameter(
+    "t", "t", "1", "polarised share of the diffuse part",
+    0.0, 1.0, (0.0, 1.0), 0.5, part="diffuse",
 )  # fmt: skip
 
 _SHADOWING = Option(
@@ -81,7 +93,7 @@ FAST_SIGMA = 0.06
 #: Bounds of a fit for normalization="visible", whose average diverges for k ≤ 1/3.
 _VISIBLE_K = 0.35
 #: cosθ of the direction of view at which the diffuse albedo is estimated: the mean of cosθ over cosθ dω.
-_MEAN_COSINE = 2.0 / 3.0
+MEAN_COSINE = 2.0 / 3.0
 
 
 def specular_reflection(geometry: Geometry, sigma: Any, n: Any, kappa: Any | None, shadowing: str) -> Matrix:
@@ -90,10 +102,27 @@ def specular_reflection(geometry: Geometry, sigma: Any, n: Any, kappa: Any | Non
     return facet_reflection(geometry, density, SHADOWING[shadowing](geometry, sigma), n, kappa)
 
 
+def check_index(n: Any, kappa: Any, names: tuple[str, str] = ("n", "kappa")) -> None:
+    """Check that a dielectric is denser than air; raises ModelError."""
+    n, kappa = to_numpy(n), to_numpy(kappa)
+    if n is not None and kappa is not None and ((n < 1.0) & (kappa == 0.0)).any():
+        raise ModelError(
+            f"{names[0]} must be at least 1 where {names[1]} is 0: the coating is denser than air"
+        )
+
+
 class _GaussianFacets(Model):
     """What both models share: Gaussian facets on a coating of index n − iκ over a body of the MRPV shape."""
 
-    parameters: ClassVar[tuple[Parameter, ...]] = _PARAMETERS
+    parameters: ClassVar[tuple[Parameter, ...]] = (
+        SLOPE,
+        INDEX,
+        EXTINCTION,
+        AMPLITUDE,
+        MINNAERT,
+        ASYMMETRY,
+        POLARISED_SHARE,
+    )
     gaussian_slopes: ClassVar[bool] = True
 
     def for_rendering(self) -> Self:
@@ -123,13 +152,11 @@ class _GaussianFacets(Model):
     def albedos(self, cos_theta: Any, values: Mapping[str, Any]) -> tuple[Any, Any]:
         """Fresnel reflectance of the flat surface, and the diffuse albedo of a mean direction."""
         facets = mueller_reflection(cos_theta, values["n"], values["kappa"]).mean
-        body = mrpv(cos_theta, _MEAN_COSINE, -_MEAN_COSINE * cos_theta, values["a"], values["k"], values["b"])
+        body = mrpv(cos_theta, MEAN_COSINE, -MEAN_COSINE * cos_theta, values["a"], values["k"], values["b"])
         return facets, math.pi * body
 
     def _check_together(self) -> None:
-        n, kappa = to_numpy(self.values["n"]), to_numpy(self.values["kappa"])
-        if n is not None and kappa is not None and ((n < 1.0) & (kappa == 0.0)).any():
-            raise ModelError("n must be at least 1 where kappa is 0: the coating is denser than air")
+        check_index(self.values["n"], self.values["kappa"])
 
 
 class DoubleGauss(_GaussianFacets):

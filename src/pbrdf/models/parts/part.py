@@ -31,6 +31,9 @@ class Part:
         """Its 4 x 4 Mueller matrix in 1/sr over generic Dr.Jit floats; structural zeros are the Python number 0."""
         raise NotImplementedError
 
+    def check(self, values: Mapping[str, Any]) -> None:
+        """Check conditions that tie several parameters; raises ModelError."""
+
     def lobe_width(self, values: Mapping[str, Any]) -> Any:
         """Standard deviation of one slope component of its facets; None where it has no lobe of known width."""
         return None
@@ -75,6 +78,9 @@ class Renamed(Part):
 
     def matrix(self, geometry: Geometry, values: Mapping[str, Any], chosen: Mapping[str, str]) -> Matrix:
         return self._part.matrix(geometry, self._named(values), chosen)
+
+    def check(self, values: Mapping[str, Any]) -> None:
+        self._part.check(self._named(values))
 
     def lobe_width(self, values: Mapping[str, Any]) -> Any:
         return self._part.lobe_width(self._named(values))
