@@ -34,7 +34,8 @@ def models(draw):
         number = st.floats(low, high)
         return st.one_of(number, arrays(float, (2, 3), elements=number))
 
-    values = {name: draw(value(*domain)) for name, domain in DOMAINS.items()}
+    domains = {p.name: DOMAINS.get(p.name, (p.domain[0], min(p.domain[1], 1e6))) for p in cls.parameters}
+    values = {name: draw(value(*domain)) for name, domain in domains.items()}
     options = {name: draw(st.sampled_from(choices)) for name, choices in cls.options.items()}
     return cls(**values, **options)
 

@@ -145,4 +145,5 @@ def plugin(mi, model, **changes):
     """The plugin's BSDF for a model, with its accuracy unless another is asked for."""
     import pbrdf.rendering
 
-    return mi.load_dict({**pbrdf.rendering.bsdf_dict(model), "accuracy": model.chosen["accuracy"], **changes})
+    asked = {name: choice for name, choice in model.chosen.items() if name == "accuracy"}
+    return mi.load_dict({**pbrdf.rendering.bsdf_dict(model), **asked, **changes})

@@ -3,16 +3,32 @@
 from __future__ import annotations
 
 from pbrdf.models.base import Model
+from pbrdf.models.baselines import (
+    Baek2018,
+    Diner2012,
+    Diner2012Uniform,
+    GermerSubsurface,
+    Litvinov2011,
+    Maignan2009,
+    RPVHotSpot,
+)
 from pbrdf.models.double_gauss import DoubleGauss, ReciprocalDoubleGauss
 from pbrdf.models.parameters import Option, Parameter
 from pbrdf.models.registry import MODELS, find_model, load_model, register
 
 __all__ = [
     "MODELS",
+    "Baek2018",
+    "Diner2012",
+    "Diner2012Uniform",
     "DoubleGauss",
+    "GermerSubsurface",
+    "Litvinov2011",
+    "Maignan2009",
     "Model",
     "Option",
     "Parameter",
+    "RPVHotSpot",
     "ReciprocalDoubleGauss",
     "find_model",
     "load_model",
@@ -21,3 +37,10 @@ __all__ = [
 
 register(DoubleGauss)
 register(ReciprocalDoubleGauss)
+register(Baek2018)
+register(GermerSubsurface)
+register(RPVHotSpot)
+register(Diner2012)
+register(Diner2012Uniform)
+register(Maignan2009)
+register(Litvinov2011)
