@@ -55,6 +55,24 @@ def pplastic_table():
 
 
 @pytest.fixture(scope="session")
+def subsurface_table():
+    """72 Mueller matrices of SCATMECH's subsurface scattering, turned to our convention."""
+    return read_oracle("subsurface_scatmech.csv")
+
+
+@pytest.fixture(scope="session")
+def rpv_table():
+    """60 Mueller matrices of eradiate's ``rpv``, turned to our convention."""
+    return read_oracle("rpv_eradiate.csv")
+
+
+@pytest.fixture(scope="session")
+def maignan_table():
+    """40 Mueller matrices of eradiate's ``maignan``, turned to our convention and to a BRDF."""
+    return read_oracle("maignan_eradiate.csv")
+
+
+@pytest.fixture(scope="session")
 def jit():
     """Turn numbers or arrays into the active backend's float64 Dr.Jit array."""
     from pbrdf.backend import get_backend

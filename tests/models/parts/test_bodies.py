@@ -33,6 +33,24 @@ def test_degree_of_polarisation_of_scatmech(part, degrees, dolp):
     np.testing.assert_allclose(f[:, 1, 0] / f[:, 0, 0], ref.diffuse_dolp(np.radians(degrees), N), atol=1e-9)
 
 
+def test_germers_body_is_scatmechs(subsurface_table):
+    """72 matrices (scripts/make_subsurface_numbers.py): the shape to the last digits, brightness where R is small.
+
+    Elsewhere the brightness tells the ρ_int that SCATMECH integrates, good to 3e-4; ours is exact (test_fresnel).
+    """
+    table = subsurface_table
+    n, R, expected = table["n"], table["pigment"], table["M"]
+    f = body(Subsurface(), n=n, pigment=R).mueller(table["theta_i"], table["theta_r"], table["phi"])
+    f00, e00 = f[:, 0, 0], expected[:, 0, 0]
+    np.testing.assert_allclose(f / f00[:, None, None], expected / e00[:, None, None], atol=1e-14)
+    faint = R < 1e-3
+    assert faint.sum() == 24
+    np.testing.assert_allclose(f00[faint], e00[faint], rtol=1e-9)
+    rho_int = 1.0 - (1.0 - ref.external_diffuse_reflectance(n)) / n**2
+    theirs = (1.0 - (1.0 - rho_int * R) * f00 / e00) / R
+    np.testing.assert_allclose(theirs[~faint], rho_int[~faint], atol=3e-4)
+
+
 @pytest.mark.parametrize("R", [0.1, 0.7, 1.0])
 def test_germers_body_adds_up_what_the_surface_sends_back(R):
     """(R/π) T_o Dep T_i/n² (1 + ρR + (ρR)² + …), with SCATMECH's ρ_int."""
@@ -82,6 +100,18 @@ def test_baeks_body_loses_what_the_surface_sends_back():
     T_p, T_s = ref.transmittance(theta, N, "flux")
     found = directional_hemispherical_reflectance(body(CoatedLambert(), n=N, albedo=0.6), theta)
     np.testing.assert_allclose(found, 0.6 * 0.5 * (T_p + T_s) * N**2 * (1.0 - RHO_INT), rtol=1e-4)
+
+
+def test_rpv_body_is_eradiates(rpv_table):
+    """60 matrices (scripts/make_eradiate_numbers.py), a quarter of them within the hot spot."""
+    angles = [rpv_table[name] for name in ("theta_i", "theta_r", "phi")]
+    values = {name: rpv_table[name] for name in ("rho_0", "k", "asymmetry", "rho_c")}
+    expected = rpv_table["M"]
+    np.testing.assert_allclose(
+        body(HotSpotRPV(), **values).mueller(*angles), expected, rtol=0, atol=1e-13 * expected.max()
+    )
+    without = body(HotSpotRPV(), **{**values, "rho_c": 1.0}).mueller(*angles)
+    assert (expected[:, 0, 0] > 1.4 * without[:, 0, 0]).sum() >= 10
 
 
 def test_hot_spot_only_in_backscatter():

@@ -71,6 +71,15 @@ def test_maignan(unit):
     check(lobe(MaignanLobe(), strength=5 * np.exp(-0.8), n=n), angles, brf / np.pi, M)
 
 
+def test_maignan_is_eradiates(maignan_table):
+    """40 matrices (scripts/make_eradiate_numbers.py), some of them near backscatter."""
+    angles = [maignan_table[name] for name in ("theta_i", "theta_r", "phi")]
+    C, ndvi, n = (maignan_table[name] for name in ("C", "ndvi", "n"))
+    expected = maignan_table["M"]
+    found = lobe(MaignanLobe(), strength=C * np.exp(-ndvi), n=n).mueller(*angles)
+    assert (np.abs(found - expected).max((1, 2)) < 1e-10 * expected[:, 0, 0]).all()
+
+
 @given(UNIT)
 def test_litvinov(unit):
     """BRF = α f_sh exp(−tan²θ/2σ²)/(8σ² cos⁴θ (μ_i + μ_r)) R_F, f_sh = [½(1 + cos(k_γ(π − Θ)))]³."""
