@@ -37,7 +37,9 @@ __all__ = [
 #: Slope width within which facets of any tilt are found.
 _BROAD = 0.35
 
-_LAND_INDEX = replace(COATING_INDEX, description="real refractive index of the facets", fitted=False)
+_LAND_INDEX = replace(
+    COATING_INDEX, description="real refractive index of the facets", fitted=False, part="specular"
+)
 
 
 def _strength(symbol: str, description: str, default: float) -> Parameter:

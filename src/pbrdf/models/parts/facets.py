@@ -183,11 +183,16 @@ class Facets(Part):
 
     def matrix(self, geometry: Geometry, values: Mapping[str, Any], chosen: Mapping[str, str]) -> Matrix:
         shadowing = chosen["shadowing"] if self.options else self._shadowing[0]
+        seen = SHADOWING[shadowing](geometry, values.get("sigma"))
+        share = self.share(geometry, values)
+        if share is not None:
+            seen = share * seen
         density = self._density.projected_area(geometry, values)
-        if STRENGTH in self.parameters:
-            density = density * values["strength"]
-        share = SHADOWING[shadowing](geometry, values.get("sigma"))
-        return facet_reflection(geometry, density, share, values["n"], values["kappa"])
+        return facet_reflection(geometry, density, seen, values["n"], values["kappa"])
+
+    def share(self, geometry: Geometry, values: Mapping[str, Any]) -> Any:
+        """Factor on the whole lobe, None for 1: ζ where it is a parameter."""
+        return values["strength"] if STRENGTH in self.parameters else None
 
     def check(self, values: Mapping[str, Any]) -> None:
         check_index(values["n"], values["kappa"])
