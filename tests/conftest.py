@@ -28,7 +28,7 @@ def read_oracle(name: str) -> dict[str, np.ndarray]:
     """Columns of a table by name; the Mueller matrices as ``M`` of shape (rows, 4, 4)."""
     with (ORACLE / name).open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
-    words = ("normalization", "transmittance")
+    words = ("normalization", "transmittance", "distribution")
     table = {
         key: np.array([row[key] if key in words else float(row[key]) for row in rows]) for key in rows[0]
     }
@@ -47,6 +47,30 @@ def scatmech_table():
 def double_gauss_table():
     """240 rows: 120 whole-model Mueller matrices in both readings."""
     return read_oracle("double_gauss.csv")
+
+
+@pytest.fixture(scope="session")
+def pplastic_table():
+    """100 Mueller matrices of Mitsuba's ``pplastic``, turned to our convention."""
+    return read_oracle("pplastic_mitsuba.csv")
+
+
+@pytest.fixture(scope="session")
+def subsurface_table():
+    """72 Mueller matrices of SCATMECH's subsurface scattering, turned to our convention."""
+    return read_oracle("subsurface_scatmech.csv")
+
+
+@pytest.fixture(scope="session")
+def rpv_table():
+    """60 Mueller matrices of eradiate's ``rpv``, turned to our convention."""
+    return read_oracle("rpv_eradiate.csv")
+
+
+@pytest.fixture(scope="session")
+def maignan_table():
+    """40 Mueller matrices of eradiate's ``maignan``, turned to our convention and to a BRDF."""
+    return read_oracle("maignan_eradiate.csv")
 
 
 @pytest.fixture(scope="session")

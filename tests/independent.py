@@ -114,6 +114,17 @@ def transmittance(beta, n, kind):
     return tuple(1 - abs(x) ** 2 if kind == "flux" else abs(x) ** 2 for x in r)
 
 
+def external_diffuse_reflectance(n):
+    """Share of diffuse light that a flat dielectric reflects, closed form (Walsh 1926; Duntley, JOSA 32, 61 (1942))."""
+    return (
+        0.5
+        + (n - 1) * (3 * n + 1) / (6 * (n + 1) ** 2)
+        + n**2 * (n**2 - 1) ** 2 / (n**2 + 1) ** 3 * np.log((n - 1) / (n + 1))
+        - 2 * n**3 * (n**2 + 2 * n - 1) / ((n**2 + 1) * (n**4 - 1))
+        + 8 * n**4 * (n**4 + 1) / ((n**2 + 1) * (n**4 - 1) ** 2) * np.log(n)
+    )
+
+
 # --- specular part ---------------------------------------------------------------------------------
 
 

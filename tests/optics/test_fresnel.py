@@ -9,7 +9,12 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 import independent as ref
-from pbrdf.optics.fresnel import mueller_reflection, refraction_root, transmittances
+from pbrdf.optics.fresnel import (
+    internal_diffuse_reflectance,
+    mueller_reflection,
+    refraction_root,
+    transmittances,
+)
 
 UNIT = arrays(float, (3, 64), elements=st.floats(0.0, 1.0))
 METALS = {"silver": 0.05 - 3.1j, "gold": 0.18 - 3.4j, "aluminium": 1.0 - 6.5j, "SiC-like": 0.06 - 0.5j}
@@ -187,3 +192,28 @@ def test_table_of_literature_3e(transmission, degrees, literal, flux, dolp):
         assert 0.5 * (T_p - T_s)[0] == pytest.approx(m01, abs=1.5e-6)
         assert ((T_p - T_s) / (T_p + T_s))[0] == pytest.approx(dolp, abs=1e-6)
         assert ref.diffuse_dolp(beta[0], 1.6207) == pytest.approx(dolp, abs=1e-6)
+
+
+@pytest.mark.parametrize(("low", "high", "tolerance"), [(1.05, 3.0, 1e-12), (1.001, 100.0, 1e-8)])
+def test_internal_diffuse_reflectance_in_closed_form(jit, low, high, tolerance):
+    n = np.geomspace(low, high, 40)
+    expected = 1.0 - (1.0 - ref.external_diffuse_reflectance(n)) / n**2
+    # the closed form itself loses digits towards n = 1
+    np.testing.assert_allclose(internal_diffuse_reflectance(jit(n)).numpy(), expected, atol=tolerance)
+
+
+def test_internal_diffuse_reflectance_from_inside(jit):
+    """∫R 2μ dμ over the directions inside, total reflection beyond the critical angle: no use of L/n² at all."""
+    n = 1.6207
+    node, weight = np.polynomial.legendre.leggauss(400)
+    critical = np.sqrt(1 - 1 / n**2)
+    # from critical to 1 in μ = cosβ', with a square root at the critical angle
+    u = 0.5 * (node + 1)
+    mu = critical + (1 - critical) * u * u
+    outside = np.arcsin(np.clip(n * np.sqrt(1 - mu**2), 0, 1))
+    r_p, r_s = (abs(r) ** 2 for r in ref.fresnel_r(outside, n))
+    expected = critical**2 + (weight * (1 - critical) * u * mu * (r_p + r_s)).sum()
+    found = internal_diffuse_reflectance(jit(n)).numpy()[0]
+    assert found == pytest.approx(expected, abs=1e-9)
+    assert found == pytest.approx(0.66085, abs=1e-5)  # SCATMECH, LITERATURE 2.7
+    assert internal_diffuse_reflectance(jit(1.0)).numpy()[0] == pytest.approx(0.0, abs=1e-12)

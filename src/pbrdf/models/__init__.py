@@ -3,6 +3,15 @@
 from __future__ import annotations
 
 from pbrdf.models.base import Model
+from pbrdf.models.baselines import (
+    Baek2018,
+    Diner2012,
+    Diner2012Uniform,
+    GermerSubsurface,
+    Litvinov2011,
+    Maignan2009,
+    RPVHotSpot,
+)
 from pbrdf.models.coherent import MirrorFacetsMRPV
 from pbrdf.models.double_gauss import DoubleGauss, ReciprocalDoubleGauss
 from pbrdf.models.hyde import HydeType
@@ -18,17 +27,24 @@ from pbrdf.models.two_lobes import DoubleGaussTwoLobes
 
 __all__ = [
     "MODELS",
+    "Baek2018",
     "CookTorranceLambert",
+    "Diner2012",
+    "Diner2012Uniform",
     "DoubleGauss",
     "DoubleGaussTwoLobes",
     "GGXLambert",
     "GeneralisedGaussianMRPV",
+    "GermerSubsurface",
     "HydeType",
+    "Litvinov2011",
+    "Maignan2009",
     "MirrorFacetsMRPV",
     "Model",
     "Option",
     "Parameter",
     "PriestGermer",
+    "RPVHotSpot",
     "ReciprocalDoubleGauss",
     "find_model",
     "load_model",
@@ -44,3 +60,10 @@ register(GGXLambert)
 register(GeneralisedGaussianMRPV)
 register(DoubleGaussTwoLobes)
 register(MirrorFacetsMRPV)
+register(Baek2018)
+register(GermerSubsurface)
+register(RPVHotSpot)
+register(Diner2012)
+register(Diner2012Uniform)
+register(Maignan2009)
+register(Litvinov2011)

@@ -1,7 +1,9 @@
-"""Angular shape of the diffuse part: the modified Rahman-Pinty-Verstraete function, paper eqs (9)-(10).
+"""Angular shapes of bodies: the Rahman-Pinty-Verstraete function and the modified one, paper eqs (9)-(10).
 
-This is the MRPV function (Martonchik et al. 1998; Engelsen et al. 1996) without hot spot, divided by π;
-the paper cites Rahman, Pinty and Verstraete, J. Geophys. Res. 98, 20791 (1993).
+The MRPV function (Martonchik et al. 1998; Engelsen et al. 1996) stands here without hot spot, divided by π; the paper
+cites Rahman, Pinty and Verstraete, J. Geophys. Res. 98, 20791 (1993), whose own function is :func:`rpv`. That one is
+written as VLIDORT, GRASP and the i3rc code have it, with the phase angle g = π − ω and their azimuth (0 in backscatter)
+turned into ours (0 forward): cos g = −cosω, and the sign of the last term under the root of G is plus.
 """
 
 from __future__ import annotations
@@ -11,9 +13,10 @@ from typing import Any
 
 import drjit as dr
 
+from pbrdf.optics.geometry import Geometry
 from pbrdf.optics.powers import power
 
-__all__ = ["minnaert_shape", "mrpv"]
+__all__ = ["henyey_greenstein", "hot_spot", "minnaert_shape", "mrpv", "rpv"]
 
 
 def minnaert_shape(cos_i: Any, cos_r: Any, k: Any) -> Any:
@@ -24,3 +27,33 @@ def minnaert_shape(cos_i: Any, cos_r: Any, k: Any) -> Any:
 def mrpv(cos_i: Any, cos_r: Any, cos_scattering: Any, a: Any, k: Any, b: Any) -> Any:
     """f_rpv = (a/π) [(μ_r + μ_i) μ_r μ_i]^(k−1) exp(b cosω) in 1/sr, paper eq. (9)."""
     return a * (1.0 / math.pi) * minnaert_shape(cos_i, cos_r, k) * dr.exp(b * cos_scattering)
+
+
+def henyey_greenstein(cos_scattering: Any, asymmetry: Any) -> Any:
+    """F = (1 − Θ²)/(1 − 2Θ cosω + Θ²)^{3/2}, 1 for Θ = 0; Θ < 0 scatters backwards, |Θ| < 1."""
+    base = 1.0 + asymmetry * (asymmetry - 2.0 * cos_scattering)
+    return (1.0 - asymmetry * asymmetry) / (base * dr.sqrt(base))
+
+
+def hot_spot(geometry: Geometry, rho_c: Any) -> Any:
+    """1 + R = 1 + (1 − ρ_c)/(1 + G), G = √(tan²θ_i + tan²θ_r + 2 tanθ_i tanθ_r cosφ); 2 − ρ_c in exact backscatter."""
+    i, r = geometry.omega_i, geometry.omega_r
+    # G is the distance between the points where the two rays pierce the plane z = 1
+    x, y = i[0] / i[2] - r[0] / r[2], i[1] / i[2] - r[1] / r[2]
+    distance = dr.sqrt(dr.maximum(dr.fma(x, x, y * y), 1e-30))
+    return 1.0 + (1.0 - rho_c) / (1.0 + distance)
+
+
+def rpv(geometry: Geometry, rho_0: Any, k: Any, asymmetry: Any, rho_c: Any) -> Any:
+    """f = (ρ_0/π) [μ_i μ_r (μ_i + μ_r)]^(k−1) F(ω) (1 + R) in 1/sr.
+
+    Parameters
+    ----------
+    geometry
+        Both rays above the horizon.
+    rho_0, k, asymmetry, rho_c
+        Amplitude, exponent, Henyey-Greenstein asymmetry Θ and hot-spot parameter; ρ_c = 1 is no hot spot.
+    """
+    shape = minnaert_shape(geometry.cos_i, geometry.cos_r, k)
+    scattered = henyey_greenstein(geometry.cos_scattering, asymmetry)
+    return rho_0 * (1.0 / math.pi) * shape * scattered * hot_spot(geometry, rho_c)

@@ -15,8 +15,18 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import drjit as dr
+import numpy as np
 
-__all__ = ["Reflection", "mueller_reflection", "refraction_root", "transmittances"]
+__all__ = [
+    "Reflection",
+    "internal_diffuse_reflectance",
+    "mueller_reflection",
+    "refraction_root",
+    "transmittances",
+]
+
+#: Gauss-Legendre rule on (−1, 1) of :func:`internal_diffuse_reflectance`.
+_GAUSS = [(float(x), float(w)) for x, w in zip(*np.polynomial.legendre.leggauss(16), strict=True)]
 
 
 class Reflection(NamedTuple):
@@ -133,6 +143,27 @@ def transmittances(cos_beta: Any, n: Any, kappa: Any | None = None, kind: str = 
     g = _multiply(g, _divide((z[0], -z[1]), z))
     half = 2.0 * q2 * g[0] / (den_s * den_p)
     return dr.fma(half, sin2, T_s), half
+
+
+def internal_diffuse_reflectance(n: Any) -> Any:
+    """Share ρ_int of diffuse light inside a medium of index n that its flat surface to air sends back.
+
+    Outside, diffuse light is reflected by ρ_ext = ∫₀¹ R(μ) 2μ dμ. Radiance over n² is conserved through the surface
+    and its transmittance is the same both ways, so what enters from outside, 1 − ρ_ext, is n² times what leaves from
+    inside: ρ_int = 1 − (1 − ρ_ext)/n² = 1 − n⁻² ∫₀¹ T(μ) 2μ dμ, total reflection included. With μ = s² a Gauss rule of
+    16 points takes the integral to 1e-12 for 1.05 ≤ n ≤ 3 and to 1e-8 for any n ≥ 1.
+
+    Parameters
+    ----------
+    n
+        Real index, at least 1.
+    """
+    total: Any = 0.0
+    for x, weight in _GAUSS:
+        s = 0.5 * (x + 1.0)
+        mean, _ = transmittances(s * s, n)
+        total = total + (2.0 * weight * s**3) * mean
+    return 1.0 - total / (n * n)
 
 
 def _multiply(a: tuple[Any, Any], b: tuple[Any, Any]) -> tuple[Any, Any]:
