@@ -24,6 +24,7 @@ from pbrdf.version import __version__
 if TYPE_CHECKING:
     from pbrdf.data import check, make_dataset, read, validate, write
     from pbrdf.data.paints import PAINTS, load_paint, open_experiment
+    from pbrdf.data.readers import register_reader
     from pbrdf.instruments.calibration.instrument_calibration import calibrate_instrument
     from pbrdf.instruments.goniometer.protocols import Protocol
     from pbrdf.instruments.polarimeter.detector import Detector
@@ -99,6 +100,7 @@ _HOME = {
     # data sets
     "read": "pbrdf.data",
     "write": "pbrdf.data",
+    "register_reader": "pbrdf.data.readers",
     "make_dataset": "pbrdf.data",
     "check": "pbrdf.data",
     "validate": "pbrdf.data",
@@ -209,6 +211,7 @@ __all__ = [
     "reduce_frames",
     "register",
     "register_bsdf",
+    "register_reader",
     "render_stokes",
     "retardance_set",
     "rotating_polarizer",

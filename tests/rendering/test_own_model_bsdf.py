@@ -39,14 +39,15 @@ def test_matrices_are_those_of_the_model(variant, model):
 
 @EVERY
 def test_every_model_is_a_bsdf(cls):
-    """Away from grazing, where float32 loses the half vector, within 1e-3 of f00."""
+    """Away from grazing, where float32 loses the half vector, within 1e-3 of f00, or of 1e-3/sr where it is darker."""
     mi = use("llvm_ad_mono_polarized")
     model = example(cls, 3)
     wi, wo = directions(30, 70.0, 1), directions(30, 70.0, 2)
     found = to_surface_frames(call(mi, mi.load_dict(bsdf_dict(model)).eval, wi, wo)[:, 0], wi, wo)
     expected = model.mueller(*light(wi, wo)) * wo[:, 2, None, None]
     signs = np.diag([1.0, -1.0, -1.0, -1.0])
-    assert (np.abs(found - signs @ expected @ signs).max((1, 2)) / expected[:, 0, 0]).max() < 1e-3
+    off = np.abs(found - signs @ expected @ signs).max((1, 2))
+    assert (off / np.maximum(expected[:, 0, 0], 1e-3)).max() < 1e-3
 
 
 @pytest.mark.slow

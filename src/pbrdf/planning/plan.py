@@ -41,6 +41,8 @@ __all__ = ["Plan", "information", "plan"]
 SAMPLES = 16
 #: Errors of a parameter near 0 are relative to this part of its natural spread.
 _NEAR_ZERO = 0.1
+#: Readings of this part of the brightest tell nothing.
+DARK = 1e-12
 
 
 @dataclass(frozen=True)
@@ -296,7 +298,10 @@ def information(
     if angle_error:
         parts = [_angle_covariance(space, unknowns, p, angle_error) for p in protocols]
         spread = spread + np.concatenate(parts, axis=1)
-    jacobian = jacobian[..., seen, :]
+    # a statement of relative errors alone would find the far tail of a lobe as telling as its peak
+    dark = values[..., 0] <= DARK * values[..., 0].max(axis=-1, keepdims=True)
+    jacobian = np.where(dark[..., None, None], 0.0, jacobian[..., seen, :])
+    spread = np.where(dark[..., None, None], np.eye(4), spread)
     weighted = np.linalg.solve(spread[..., seen[:, None], seen], jacobian)
     found = np.swapaxes(jacobian, -1, -2) @ weighted
     return 0.5 * (found + np.swapaxes(found, -1, -2))
