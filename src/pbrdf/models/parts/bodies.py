@@ -76,7 +76,7 @@ class Subsurface(_BelowFlatSurface):
         COATING_INDEX,
         Parameter(
             "pigment", "R", "1", "diffuse reflectance of the pigment below the surface",
-            1e-3, 1.0, (0.0, 1.0), 0.5, logarithmic=True, part="diffuse",
+            1e-4, 1.0, (0.0, 1.0), 0.5, logarithmic=True, part="diffuse",
         ),
     )  # fmt: skip
 
