@@ -29,6 +29,7 @@ __all__ = [
     "Structure",
     "error_analysis",
     "residual_structure",
+    "sign_test",
 ]
 
 #: Below this probability, residuals without structure do not explain what is seen.
@@ -346,12 +347,12 @@ def residual_structure(sequences: Sequence[np.ndarray]) -> Structure:
         negative=negative,
         runs=runs,
         expected_runs=float(np.arange(len(distribution)) @ distribution),
-        p_sign=_sign_test(positive, negative),
+        p_sign=sign_test(positive, negative),
         p_runs=min(float(distribution[: runs + 1].sum()), 1.0),
     )
 
 
-def _sign_test(positive: int, negative: int) -> float:
+def sign_test(positive: int, negative: int) -> float:
     """Two-sided binomial test of p = ½; both tails are equal."""
     total, fewer = positive + negative, min(positive, negative)
     tail = _log_choices(total, np.arange(fewer + 1)) - total * math.log(2.0)
