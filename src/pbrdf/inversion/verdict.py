@@ -21,7 +21,7 @@ from pbrdf.inversion.estimates import Estimate
 from pbrdf.inversion.holdout import DARK
 from pbrdf.inversion.optimum import Optimum
 
-__all__ = ["Level", "Stratum", "Verdict", "quotable", "verdict"]
+__all__ = ["Level", "Stratum", "Verdict", "percent", "quotable", "verdict"]
 
 #: Median error of the intensity over all data up to which they are described: the uncertainty of a careful
 #: goniometer is 2 to 5 %, so this is two to five times what was known of the sample.
@@ -124,8 +124,8 @@ class Stratum:
         if self.quantity == "polarisation":
             return f"rms error {self.error:.2g} of a measured {self.signal:.2g}"
         if self.biased and self.error <= self.tolerance:
-            return f"{'above' if self.bias > 0 else 'below'} the measurement by {_percent(abs(self.bias))}"
-        return f"median error {_percent(self.error)}"
+            return f"{'above' if self.bias > 0 else 'below'} the measurement by {percent(abs(self.bias))}"
+        return f"median error {percent(self.error)}"
 
     def sentence(self) -> str:
         """Where it is not described, and by how much."""
@@ -427,7 +427,7 @@ def _overall(whole: list[Stratum]) -> Iterator[str]:
 
 def _overall_size(stratum: Stratum) -> str:
     if stratum.quantity == "intensity":
-        return _percent(stratum.error)
+        return percent(stratum.error)
     return f"{stratum.error:.2g} of {stratum.signal:.2g}"
 
 
@@ -486,5 +486,5 @@ def _listed(names: list[str]) -> str:
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
-def _percent(share: float) -> str:
+def percent(share: float) -> str:
     return f"{100.0 * share:.2g} %" if share < 0.995 else f"{100.0 * share:.0f} %"
