@@ -143,6 +143,9 @@ def test_polarisation_of_the_wrong_sign_is_not_described():
     found = verdict(case(q=-0.3, q_modelled=0.3))
     assert found.level == Level.IN_PART
     assert "in part: not its polarisation, rms error 0.6 of a measured 0.3" in found.sentence
+    # with the intensity amiss as well nothing is left
+    both = verdict(case(at("theta_i", 60.0, 0.45), q=-0.3, q_modelled=0.3))
+    assert both.level == Level.DOES_NOT
     # little of it, or little wrong with it, is allowed
     assert verdict(case(q=0.005, q_modelled=-0.005)).level == Level.DESCRIBES
     assert verdict(case(q=0.3, q_modelled=0.25)).level == Level.DESCRIBES
@@ -176,7 +179,7 @@ def test_parameters_on_bounds_are_not_quoted():
     }
     found = verdict(case(estimates=estimates))
     assert found.level == Level.DESCRIBES and found.do_not_quote == ["y", "z", "w"]
-    assert "do not quote y, z and w" in found.sentence
+    assert found.sentence.endswith("do not quote y and z (on a bound) and w (not determined).")
     assert next(r for r in found.reasons if "on a bound of the search" in r).startswith("y stands")
     hopeless = verdict(case(lambda t: np.full(t.sizes["geometry"], -0.9), estimates=estimates))
     assert hopeless.do_not_quote == ["x", "y", "z", "w"]

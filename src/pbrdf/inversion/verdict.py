@@ -48,6 +48,8 @@ POINTS = 5
 GRAZING = math.radians(75.0)
 #: Facet tilt from the mirror direction that counts as near it, whatever width the fit gives the lobe; radians.
 NEAR_MIRROR = math.radians(10.0)
+#: So many parts of the data that fail are listed.
+PLACES = 3
 #: RMS of a channel in stated uncertainties below which it holds no signal.
 NO_SIGNAL = 1.5
 
@@ -176,10 +178,10 @@ def verdict(result: Optimum) -> Verdict:
     Returns
     -------
     Verdict
-        ``does_not`` if half of the fitted or of the held-out intensity is missed (median error above 50 %; where no
-        intensity was measured, the polarisation by 80 % of itself), or if something fails and the model explains no
-        channel better than a constant; ``describes`` if neither the whole nor any stratum fails, those at grazing
-        incidence aside; else ``in_part``.
+        ``does_not`` if half of the fitted or of the held-out intensity is missed (median error above 50 %), if 80 % of
+        the polarisation is and the intensity fails as well or was not measured, or if something fails and the model
+        explains no channel better than a constant; ``describes`` if neither the whole nor any stratum fails, those at
+        grazing incidence aside; else ``in_part``.
     """
     strata = list(_strata(result))
     whole = [s for s in strata if not s.where]
@@ -187,13 +189,14 @@ def verdict(result: Optimum) -> Verdict:
     explained = _explained(result)
     nothing = bool(explained) and max(explained.values()) < EXPLAINS
     counting = [s for s in failing if not s.grazing]
-    if any(_hopeless(s, whole) for s in whole) or (counting and nothing):
+    if any(_hopeless(s, whole, counting) for s in whole) or (counting and nothing):
         level = Level.DOES_NOT
     elif counting:
         level = Level.IN_PART
     else:
         level = Level.DESCRIBES
     unsure = [name for name, e in result.estimates.items() if not quotable(e)]
+    on_bounds = [name for name in unsure if result.estimates[name].verdict.startswith("at ")]
     silent = (
         [n for n, e in result.estimates.items() if e.verdict != "fixed"]
         if level == Level.DOES_NOT
@@ -201,20 +204,23 @@ def verdict(result: Optimum) -> Verdict:
     )
     return Verdict(
         level,
-        _sentence(level, whole, failing, unsure, nothing),
+        _sentence(level, whole, failing, (on_bounds, [n for n in unsure if n not in on_bounds]), nothing),
         list(_reasons(result, level, whole, failing, explained)),
         silent,
         strata,
     )
 
 
-def _hopeless(stratum: Stratum, whole: list[Stratum]) -> bool:
+def _hopeless(stratum: Stratum, whole: list[Stratum], failing: list[Stratum]) -> bool:
+    """Whether the error of everything fitted or held out is beyond all use."""
     if stratum.excused:
         return False
     if stratum.quantity == "intensity":
         return stratum.error > HOPELESS
-    alone = all(s.quantity == "polarisation" for s in whole)
-    return alone and stratum.error > max(POLARISATION_FLOOR, POLARISATION_HOPELESS * stratum.signal)
+    decides = all(s.quantity == "polarisation" for s in whole) or any(
+        s.quantity == "intensity" for s in failing
+    )
+    return decides and stratum.error > max(POLARISATION_FLOOR, POLARISATION_HOPELESS * stratum.signal)
 
 
 def _strata(result: Optimum) -> Iterator[Stratum]:
@@ -383,13 +389,19 @@ def _explained(result: Optimum) -> dict[str, float]:
 
 
 def _sentence(
-    level: Level, whole: list[Stratum], failing: list[Stratum], unsure: list[str], nothing: bool
+    level: Level,
+    whole: list[Stratum],
+    failing: list[Stratum],
+    unsure: tuple[list[str], list[str]],
+    nothing: bool,
 ) -> str:
     overall = "; ".join(_overall(whole))
     if level == Level.DOES_NOT:
-        why = ", and the fit explains no more than a constant would" if nothing else ""
-        return f"The model does not describe this sample, do not quote its parameters: {overall}{why}."
-    ending = f"; do not quote {_listed(unsure)}, on bounds or not determined" if unsure else ""
+        also = ", and the fit explains no more than a constant would" if nothing else ""
+        return f"The model does not describe this sample, do not quote its parameters: {overall}{also}."
+    why = ("on a bound", "not determined")
+    listed = [f"{_listed(names)} ({reason})" for names, reason in zip(unsure, why, strict=True) if names]
+    ending = f"; do not quote {' and '.join(listed)}" if listed else ""
     if level == Level.DESCRIBES:
         but = f", but {'; '.join(_where_not(failing))} (grazing)" if failing else ""
         return f"The model describes the data: {overall}{but}{ending}."
@@ -428,7 +440,7 @@ def _overall(whole: list[Stratum]) -> Iterator[str]:
 def _overall_size(stratum: Stratum) -> str:
     if stratum.quantity == "intensity":
         return percent(stratum.error)
-    return f"{stratum.error:.2g} of {stratum.signal:.2g}"
+    return f"{stratum.error:.2g} of a measured {stratum.signal:.2g}"
 
 
 def _reasons(
@@ -439,10 +451,10 @@ def _reasons(
     explained: dict[str, float],
 ) -> Iterator[str]:
     places = [s for s in failing if s.where]
-    for stratum in places[:5]:
+    for stratum in places[:PLACES]:
         yield f"{stratum.sentence()[0].upper()}{stratum.sentence()[1:]} ({stratum.count} points)."
-    if len(places) > 5:
-        more = len(places) - 5
+    if len(places) > PLACES:
+        more = len(places) - PLACES
         yield f"{more} further part{'s' if more > 1 else ''} of the data: missed by more than allowed."
     if explained and max(explained.values()) < EXPLAINS:
         yield "Against a constant the fit lowers χ² by less than a tenth in every channel with a signal."
