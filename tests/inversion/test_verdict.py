@@ -10,7 +10,7 @@ import pytest
 import xarray as xr
 
 import pbrdf
-from pbrdf.inversion.verdict import GRAZING, Level, verdict
+from pbrdf.inversion.verdict import DISTINCT, GRAZING, Level, verdict
 from pbrdf.optics.half_difference import facet_tilt
 
 
@@ -94,6 +94,14 @@ def test_the_worst_part_is_named(wrong, where):
     assert found.sentence.startswith(f"The model describes the data in part: {where}")
     assert where[1:] in found.reasons[0]
     assert verdict(case(lambda t: 0.1 * wrong(t))).level == Level.DESCRIBES
+
+
+def test_many_angles_of_incidence_are_judged_in_bins():
+    angles = tuple(np.linspace(10.0, 74.0, 100))
+    assert len(angles) > DISTINCT
+    found = verdict(case(lambda t: np.where(np.rad2deg(t["theta_i"]) > 67.5, 0.6, 0.0), incidences=angles))
+    assert found.level == Level.IN_PART and "not at θ_i = 70° ± 2.5°, median error 6" in found.sentence
+    assert len(found.strata) < 30
 
 
 def test_a_bias_counts_where_scatter_of_the_same_size_does_not():

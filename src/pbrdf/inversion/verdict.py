@@ -48,6 +48,9 @@ POINTS = 5
 GRAZING = math.radians(75.0)
 #: Facet tilt from the mirror direction that counts as near it, whatever width the fit gives the lobe; radians.
 NEAR_MIRROR = math.radians(10.0)
+#: Angles of incidence of more different values than this are taken together in bins of so many degrees; groups and
+#: wavelengths of more are not looked at apart.
+DISTINCT, BIN = 60, 5.0
 #: So many parts of the data that fail are listed.
 PLACES = 3
 #: RMS of a channel in stated uncertainties below which it holds no signal.
@@ -185,7 +188,7 @@ def verdict(result: Optimum) -> Verdict:
     """
     strata = list(_strata(result))
     whole = [s for s in strata if not s.where]
-    failing = sorted((s for s in strata if s.fails), key=lambda s: -s.severity)
+    failing = sorted((s for s in strata if s.fails), key=lambda s: (s.grazing, -s.severity))
     explained = _explained(result)
     nothing = bool(explained) and max(explained.values()) < EXPLAINS
     counting = [s for s in failing if not s.grazing]
@@ -300,14 +303,23 @@ def _all_parts(result: Optimum) -> Iterator[tuple[str, np.ndarray]]:
         if present.sum() >= POINTS:
             limit = np.sort(bright[present])[-max(POINTS, round(0.1 * present.sum()))]
             yield "where it is brightest (a tenth of the points)", present & (bright >= limit)
-    incidence = np.round(np.rad2deg(table["theta_i"].values) * 20.0) / 20.0
-    for angle in np.unique(incidence):
-        yield f"at θ_i = {angle:.4g}°", incidence == angle
+    degrees = np.rad2deg(table["theta_i"].values)
+    incidence = np.round(degrees * 20.0) / 20.0
+    if len(np.unique(incidence)) <= DISTINCT:
+        yield from _by_value(incidence, "at θ_i = {:.4g}°")
+    else:
+        yield from _by_value(np.round(degrees / BIN) * BIN, f"at θ_i = {{:.4g}}° ± {0.5 * BIN:g}°")
     if "wavelength" in table.coords:
-        for wavelength in np.unique(table["wavelength"].values[np.isfinite(table["wavelength"].values)]):
-            yield f"at {wavelength:.5g} nm", table["wavelength"].values == wavelength
-    for label in np.unique(table["group"].values):
-        yield f"in group {label}", table["group"].values == label
+        yield from _by_value(table["wavelength"].values, "at {:.5g} nm")
+    yield from _by_value(table["group"].values, "in group {}")
+
+
+def _by_value(column: np.ndarray, words: str) -> Iterator[tuple[str, np.ndarray]]:
+    """A part for each value that occurs often enough; none where there are too many of them to be told."""
+    values, counts = np.unique(column, return_counts=True)
+    if len(values) <= DISTINCT:
+        for value in values[counts >= POINTS]:
+            yield words.format(value), column == value
 
 
 def _intensity_errors(result: Optimum) -> np.ndarray:
