@@ -148,6 +148,51 @@ def test_chance_is_rarely_called_structure_and_a_wave_always():
     assert residual_structure([wave, wave, wave]).structured
 
 
+def test_opposite_signs_at_two_wavelengths_are_not_taken_for_chance():
+    """95 % above 0 at one wavelength and 98 % below at the next: even in all, and so are the runs."""
+    rng = np.random.default_rng(3)
+    first, second = np.abs(rng.standard_normal((2, 100)))
+    first[rng.choice(100, 5, replace=False)] *= -1.0
+    second *= -1.0
+    second[rng.choice(100, 2, replace=False)] *= -1.0
+    together = residual_structure([first, second])
+    assert together.p_sign > 0.5 and together.p_runs > 0.01 and not together.structured
+    apart = residual_structure([first, second], {"550 nm": first, "650 nm": second})
+    assert apart.structured and (apart.stratum, apart.above, apart.below) == ("650 nm", 2, 98)
+    # three tests were made, so the probability counts three times
+    alone = residual_structure([second])
+    assert apart.p_sign == pytest.approx(3.0 * alone.p_sign)
+    # the other way round
+    assert residual_structure([-first, -second], {"550 nm": -first, "650 nm": -second}).above == 98
+
+
+def test_strata_are_rarely_called_structured_by_chance():
+    rng = np.random.default_rng(0)
+    trials = []
+    for _ in range(1000):
+        data = rng.standard_normal((6, 21))
+        strata = {str(k): row for k, row in enumerate(data)}
+        trials.append(residual_structure(list(data), strata).structured)
+    assert np.mean(trials) <= 0.015
+
+
+def test_the_analysis_tests_groups_and_wavelengths():
+    rng = np.random.default_rng(4)
+    measured = np.full(8, 1.0)
+    shift = np.array([0.1, 0.2, 0.1, 0.3, -0.1, -0.2, -0.1, -0.3])
+    fit = by_hand(I_measured=measured, I_modelled=measured + shift * (1.0 + 0.01 * rng.standard_normal(8)))
+    fit.comparison["held_out"] = ("geometry", np.zeros(8, dtype=bool))
+    assert error_analysis(fit).structure["I"].stratum.startswith("group ")
+    coloured = by_hand(I_measured=measured, I_modelled=measured + shift)
+    coloured.comparison["held_out"] = ("geometry", np.zeros(8, dtype=bool))
+    coloured.comparison["group"] = ("geometry", np.ones(8, dtype=int))
+    coloured.comparison = coloured.comparison.assign_coords(
+        wavelength=("geometry", [550.0] * 4 + [650.0] * 4)
+    )
+    structure = error_analysis(coloured).structure["I"]
+    assert structure.stratum in ("550 nm", "650 nm") and abs(structure.above - structure.below) == 4
+
+
 def test_the_right_model_leaves_chance_and_a_wrong_one_structure():
     """Without its polarised diffuse part (t = 0) the model's DoLP lies below the data right of the peak."""
     dataset = pbrdf.open_experiment("matte-white-thick")

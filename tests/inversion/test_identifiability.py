@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 from linear_helpers import design, linear_fit
 from scipy.optimize import least_squares
 
 import pbrdf
-from pbrdf.errors import FitError
 from pbrdf.inversion.identifiability import identifiability
 
 
@@ -16,7 +14,7 @@ def test_two_equal_columns_are_named_and_the_third_is_not(monkeypatch):
     matrix = design()[:, [0, 1, 1]]
     result = linear_fit(monkeypatch, matrix, matrix @ [1.0, 2.0, 2.0])
     result.unknowns = np.array([1.0, 2.0, 2.0])
-    found = identifiability(result)
+    found = identifiability(result, described=True)
     assert found.condition == np.inf
     (combination,) = found.combinations
     assert not combination.determined
@@ -31,7 +29,7 @@ def test_two_equal_columns_are_named_and_the_third_is_not(monkeypatch):
 def test_an_unknown_without_influence_is_named_alone(monkeypatch):
     matrix = design() * [1.0, 0.0, 1.0]
     result = linear_fit(monkeypatch, matrix, matrix @ [1.0, 0.0, 2.0])
-    found = identifiability(result)
+    found = identifiability(result, described=True)
     assert found.sentences == [
         "The data do not determine y: moving it anywhere between -50 and 50 changes χ² by less than 1 (the others "
         "refitted)."
@@ -43,7 +41,7 @@ def test_variance_inflation_is_that_of_regression(monkeypatch):
     """1/(1 − R²) of each column regressed on the others (uncentred), and both standard errors."""
     matrix = design()
     result = linear_fit(monkeypatch, matrix, matrix @ [1.0, 2.0, 3.0])
-    found = identifiability(result).parameters
+    found = identifiability(result, described=True).parameters
     for i, name in enumerate("xyz"):
         others, column = np.delete(matrix, i, axis=1), matrix[:, i]
         left = column - others @ np.linalg.lstsq(others, column, rcond=None)[0]
@@ -117,11 +115,23 @@ def test_parameters_on_a_bound_are_left_out_and_named():
     found = identifiability(result)
     assert found.at_bound == ["t"]
     assert "t" not in found.directions["parameter"]
-    assert found.sentences[-1] == "Left out, as the optimum lies on a bound: t."
+    first, second = found.sentences
+    assert "The data determine sigma, n, a, k and b; no combination of these" in first or "trade off" in first
+    assert second == "Not determined, as the optimum lies on a bound: t."
+    assert not any("every free parameter" in sentence for sentence in found.sentences)
 
 
-def test_nothing_but_bounds_is_an_error(monkeypatch):
+def test_nothing_but_bounds_determines_nothing(monkeypatch):
     matrix = design()[:, :1]
     result = linear_fit(monkeypatch, matrix, matrix @ [9.0], upper=3.0)
-    with pytest.raises(FitError, match="every free parameter stands on a bound"):
-        identifiability(result)
+    found = identifiability(result, described=True)
+    assert found.sentences == ["Not determined, as the optimum lies on a bound: x."]
+    assert found.eigenvalues.shape == (0,) and found.condition == np.inf
+
+
+def test_a_model_that_does_not_describe_the_data_has_nothing_determined(monkeypatch):
+    matrix = design()
+    result = linear_fit(monkeypatch, matrix, matrix @ [1.0, 2.0, 3.0])
+    (sentence,) = identifiability(result, described=False).sentences
+    assert sentence.startswith("Nothing can be said of what the data determine")
+    assert len(identifiability(result, described=True).sentences) >= 1

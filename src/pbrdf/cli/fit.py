@@ -135,6 +135,13 @@ def fit(
         str | None,
         typer.Option(help="Predict each fold from the others; folds by group, theta_i, angle or fraction."),
     ] = None,
+    suggest: Annotated[
+        bool,
+        typer.Option(
+            "--suggestions/--no-suggestions",
+            help="Where the model does not describe the data, try for some seconds what would.",
+        ),
+    ] = True,
     seed: Annotated[int, seed_option("Seed of the starts and of a held-out fraction.")] = 0,
     output: Annotated[
         Path | None,
@@ -150,7 +157,7 @@ def fit(
     ] = False,
     quiet: Annotated[bool, quiet_option("Print the names of the folders only.")] = False,
 ) -> None:
-    """Fit a model to measured data, and say how well each parameter is known.
+    """Fit a model to measured data, and say what the fit is worth and how well each parameter is known.
 
     Writes a folder with summary.txt, figure.png, model.json, fit.json (all numbers), comparison.nc
     (measured, modelled, residual), fit.nc (all of the fit, for pbrdf.load_fit) and starts.png, and with
@@ -212,6 +219,7 @@ def fit(
                     bootstrap=bootstrap,
                     cross_validate=cross_validate,
                     contours=pairs_drawn,
+                    suggest=suggest,
                     fit_arguments={
                         "model": chosen,
                         **{k: v for k, v in arguments.items() if k != "hold_out"},

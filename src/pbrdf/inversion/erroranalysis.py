@@ -9,7 +9,7 @@ peak the modelled DoLP lies below the measured one. All errors here are model �
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -29,6 +29,7 @@ __all__ = [
     "Structure",
     "error_analysis",
     "residual_structure",
+    "sign_test",
 ]
 
 #: Below this probability, residuals without structure do not explain what is seen.
@@ -102,9 +103,9 @@ class ErrorStatistics:
 class Structure:
     """Whether the signs of residuals look like chance.
 
-    Independent residuals of a right model are as often positive as negative and change sign every other time. Runs
-    are stretches of equal sign in the order of the angle; few long runs mean that the model departs from the
-    measurement in a smooth way that noise does not explain.
+    Independent residuals of a right model are as often positive as negative, in every group and at every wavelength,
+    and change sign every other time. Runs are stretches of equal sign in the order of the angle; few long runs mean
+    that the model departs from the measurement in a smooth way that noise does not explain.
 
     Attributes
     ----------
@@ -113,10 +114,13 @@ class Structure:
     runs, expected_runs
         Number of runs, and its mean under independence.
     p_sign
-        Probability, for an unbiased model, of signs at least as uneven (exact binomial test, two-sided).
+        Probability, for an unbiased model, of signs at least as uneven in any stratum or in all (exact binomial test,
+        two-sided, the least probability times the number of tests: Bonferroni).
     p_runs
         Probability, for independent residuals with these numbers of signs, of at most as many runs (exact
         Wald-Wolfowitz test, one-sided); 1 where all have one sign.
+    stratum, above, below
+        Where the signs are the least even, in words, and their numbers there; ``""`` for all together.
     """
 
     positive: int
@@ -125,6 +129,9 @@ class Structure:
     expected_runs: float
     p_sign: float
     p_runs: float
+    stratum: str = ""
+    above: int = 0
+    below: int = 0
 
     @property
     def structured(self) -> bool:
@@ -280,18 +287,31 @@ def error_analysis(result: Optimum) -> ErrorAnalysis:
     everything = np.ones(size, dtype=bool)
     order = np.argsort(offset, kind="stable")
 
-    def structure(sets: Sequence[np.ndarray]) -> dict[str, Structure]:
+    colour = table["wavelength"].values if "wavelength" in table.coords else np.zeros(size)
+    colours = [] if len(np.unique(colour)) < 2 else [c for c in np.unique(colour) if np.isfinite(c)]
+
+    def structure(members: np.ndarray, by_group: bool) -> dict[str, Structure]:
+        """Signs by group and by wavelength; runs along the angle within either."""
+        strata: dict[str, np.ndarray] = {}
+        if by_group and len(np.unique(labels[members])) > 1:
+            strata = {f"group {label}": members & (labels == label) for label in np.unique(labels[members])}
+        strata |= {f"{c:g} nm": members & (colour == c) for c in colours if (members & (colour == c)).any()}
+        runs_in = [members & (labels == label) for label in np.unique(labels[members])]
+        if colours:
+            runs_in = [where & (colour == c) for where in runs_in for c in colours]
         found = {}
         for channel in result.data.channels:
             residual = column(f"{channel}_residual")
-            sequences = [residual[order[where[order]]] for where in sets]
-            found[channel] = residual_structure([r[np.isfinite(r)] for r in sequences])
+            here = np.isfinite(residual)
+            found[channel] = residual_structure(
+                [residual[order[(where & here)[order]]] for where in runs_in],
+                {name: residual[where & here] for name, where in strata.items()},
+            )
         return found
 
-    groups, fitted_sets = [], []
+    groups = []
     for label in np.unique(labels):
         members = labels == label
-        fitted_sets.append(members & ~held)
         right = members & ~near & (offset > 0.0)
         groups.append(
             GroupErrors(
@@ -304,7 +324,7 @@ def error_analysis(result: Optimum) -> ErrorAnalysis:
                 strongest_diffuse=brightest(members & ~near),
                 relative_right_of_peak=mean("relative_error", right),
                 dolp_right_of_peak=mean("dolp_error", right),
-                structure=structure([members]),
+                structure=structure(members, by_group=False),
             )
         )
     return ErrorAnalysis(
@@ -313,11 +333,13 @@ def error_analysis(result: Optimum) -> ErrorAnalysis:
         intensity=statistics("intensity_error", everything),
         relative=statistics("relative_error", everything),
         dolp=statistics("dolp_error", everything),
-        structure=structure(fitted_sets),
+        structure=structure(~held, by_group=True),
     )
 
 
-def residual_structure(sequences: Sequence[np.ndarray]) -> Structure:
+def residual_structure(
+    sequences: Sequence[np.ndarray], strata: Mapping[str, np.ndarray] | None = None
+) -> Structure:
     """Test the signs of residuals and their order against chance.
 
     Parameters
@@ -325,6 +347,9 @@ def residual_structure(sequences: Sequence[np.ndarray]) -> Structure:
     sequences
         Residuals in the order of the angle, one array of shape (N,) for each group; runs do not go across groups.
         Residuals of exactly 0 are left out.
+    strata
+        Residuals of parts of the data by name, whose signs are tested as well: what is too high at one wavelength and
+        too low at the next may be even in all.
 
     Returns
     -------
@@ -341,18 +366,37 @@ def residual_structure(sequences: Sequence[np.ndarray]) -> Structure:
         positive, negative = positive + above, negative + len(signs) - above
         runs += 1 + int((signs[1:] != signs[:-1]).sum())
         distribution = np.convolve(distribution, _run_probabilities(above, len(signs) - above))
+    tested = {"": (positive, negative)}
+    for name, values in (strata or {}).items():
+        tested[name] = (int((values > 0.0).sum()), int((values < 0.0).sum()))
+    odds = {name: sign_test(*signs) for name, signs in tested.items()}
+    worst = min(odds, key=lambda name: odds[name])
     return Structure(
         positive=positive,
         negative=negative,
         runs=runs,
         expected_runs=float(np.arange(len(distribution)) @ distribution),
-        p_sign=_sign_test(positive, negative),
+        p_sign=min(1.0, len(odds) * odds[worst]),
         p_runs=min(float(distribution[: runs + 1].sum()), 1.0),
+        stratum=worst,
+        above=tested[worst][0],
+        below=tested[worst][1],
     )
 
 
-def _sign_test(positive: int, negative: int) -> float:
-    """Two-sided binomial test of p = ½; both tails are equal."""
+def sign_test(positive: int, negative: int) -> float:
+    """Two-sided binomial test of p = ½, whose tails are equal.
+
+    Parameters
+    ----------
+    positive, negative
+        Numbers of signs of either kind.
+
+    Returns
+    -------
+    float
+        Probability of signs at least as uneven.
+    """
     total, fewer = positive + negative, min(positive, negative)
     tail = _log_choices(total, np.arange(fewer + 1)) - total * math.log(2.0)
     return min(1.0, 2.0 * float(np.exp(tail).sum()))
@@ -426,10 +470,21 @@ def _group_sentences(group: GroupErrors) -> list[str]:
 def _structure_sentences(structure: dict[str, Structure]) -> list[str]:
     found = {channel: s for channel, s in structure.items() if s.structured}
     if not found:
-        return ["The signs of the residuals look like chance in every fitted channel."]
+        return [
+            "The signs of the residuals look like chance in every fitted channel, and so they do by group and "
+            "wavelength."
+        ]
     return [
         f"The residuals of {channel} are structured ({s.runs} runs of equal sign where {s.expected_runs:.0f} were to "
-        f"be expected, {s.positive} above 0 and {s.negative} below): the model departs from the measurement in a way "
-        "that noise does not explain."
+        f"be expected, {s.positive} above 0 and {s.negative} below{_uneven(s)}): the model departs from the "
+        "measurement in a way that noise does not explain."
         for channel, s in found.items()
     ]
+
+
+def _uneven(structure: Structure) -> str:
+    if not structure.stratum:
+        return ""
+    return f"; {structure.above} above and {structure.below} below at {structure.stratum}".replace(
+        "at group", "in group"
+    )

@@ -21,10 +21,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pbrdf.errors import FitError
 from pbrdf.inversion.optimum import Optimum
 from pbrdf.inversion.refits import Optima
 from pbrdf.inversion.statistics import covariance, prior_spread
+from pbrdf.inversion.verdict import Level, verdict
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -87,6 +87,8 @@ class Identifiability:
         Free parameters on a bound; they are left out, as their χ² rises linearly or not at all.
     combinations
         Not determined or traded off, the worst first.
+    described
+        Whether the model describes the data at all; if not, no sentence says that they determine anything.
     """
 
     eigenvalues: np.ndarray
@@ -95,49 +97,57 @@ class Identifiability:
     parameters: xr.Dataset
     at_bound: list[str]
     combinations: list[Combination] = field(default_factory=list)
+    described: bool = True
 
     @property
     def sentences(self) -> list[str]:
         """The findings in words."""
+        if not self.described:
+            return ["Nothing can be said of what the data determine, as the model does not describe them."]
         found = [combination.sentence for combination in self.combinations]
-        if not found:
+        inside = [str(name) for name in self.parameters["parameter"].values]
+        if not found and not self.at_bound:
             found = ["The data determine every free parameter; no combination of them is nearly free."]
+        elif not found and len(inside) == 1:
+            found = [f"The data determine {inside[0]}, the others being where they are."]
+        elif not found and inside:
+            found = [f"The data determine {_listed(inside)}; no combination of these is nearly free."]
         if self.at_bound:
-            found.append(f"Left out, as the optimum lies on a bound: {', '.join(self.at_bound)}.")
+            found.append(f"Not determined, as the optimum lies on a bound: {', '.join(self.at_bound)}.")
         return found
 
 
-def identifiability(result: Optimum) -> Identifiability:
+def identifiability(result: Optimum, *, described: bool | None = None) -> Identifiability:
     """Name the combinations of parameters that the data of a fit do not determine.
 
     Parameters
     ----------
     result
         A fit.
+    described
+        Whether the model describes the data; None asks :func:`~pbrdf.inversion.verdict.verdict`.
 
     Returns
     -------
     Identifiability
-
-    Raises
-    ------
-    FitError
-        If every free parameter stands on a bound.
+        Without directions where every free parameter stands on a bound.
     """
     import xarray as xr
+
+    if described is None:
+        described = verdict(result).level != Level.DOES_NOT
 
     optima = Optima.of(result)
     space = result.space
     inside = np.flatnonzero(~optima.at_bound[0])
     names = [space.names[i] for i in inside]
-    if not names:
-        raise FitError("every free parameter stands on a bound: there is no direction to judge")
     scale = 1.0 if result.std_known else max(result.goodness.reduced_chi2, 1e-300)
     spread = prior_spread(optima.low, optima.high)[inside]
     matrix = result.information[np.ix_(inside, inside)] * np.outer(spread, spread) / scale
     eigenvalues, vectors = np.linalg.eigh(matrix)
-    floor = max(float(eigenvalues.max()), 0.0) * 1e-15 + 1e-200
-    condition = float(eigenvalues[-1] / eigenvalues[0]) if eigenvalues[0] > floor else math.inf
+    floor = max(float(eigenvalues.max(initial=0.0)), 0.0) * 1e-15 + 1e-200
+    least = float(eigenvalues.min(initial=math.inf))
+    condition = float(eigenvalues[-1]) / least if floor < least < math.inf else math.inf
     eigenvalues = np.maximum(eigenvalues, floor)
 
     # d parameter / d unknown, by a central difference far above rounding and far below any curvature
@@ -179,6 +189,7 @@ def identifiability(result: Optimum) -> Identifiability:
         parameters,
         [space.names[i] for i in np.flatnonzero(optima.at_bound[0])],
         combinations,
+        described,
     )
 
 
@@ -213,7 +224,8 @@ def _combination(
     lanes = []
     for sign in (1.0, -1.0):
         room = np.where(sign * step > 0.0, optima.high - best, best - optima.low)
-        with np.errstate(divide="ignore"):
+        # 0/0 where an unknown on its bound stays there; it is not among the columns
+        with np.errstate(divide="ignore", invalid="ignore"):
             longest = float((room / np.abs(step))[columns].min())
         # what is not determined may go to its bounds, whatever the curvature at the optimum says
         longest = min(length, longest) if determined else longest

@@ -57,7 +57,7 @@ def notes_on(
     reduced = result.goodness.reduced_chi2
     if data.std_known and reduced > 2.0:
         notes.append(
-            f"Reduced χ² is {reduced:.3g}: the model does not describe the data to their stated uncertainty, and "
-            "the standard errors are too small by about its square root."
+            f"Reduced χ² is {reduced:.3g}: the model departs from the data by more than their stated uncertainty, and "
+            f"the standard errors are too small by a factor of about {reduced**0.5:.2g}."
         )
     return notes

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pbrdf.inversion.optimum import Optimum
+from pbrdf.inversion.verdict import Level, verdict
 from pbrdf.models.base import Model
 from pbrdf.models.realisability import least_coherency
 from pbrdf.models.reflectance import directional_hemispherical_reflectance
@@ -84,7 +85,7 @@ def plausibility(result: Optimum, dataset: xr.Dataset | None = None) -> list[Fin
     return [
         _energy(result, attributes),
         _realisability(result.model),
-        *_parameters(result),
+        *_parameters(result, verdict(result).level),
         _lobe(result),
         *_range(result),
     ]
@@ -144,8 +145,11 @@ def _realisability(model: Model) -> Finding:
     return Finding("realisability", Severity.VIOLATION, sentence)
 
 
-def _parameters(result: Optimum) -> list[Finding]:
+def _parameters(result: Optimum, level: Level) -> list[Finding]:
     findings = []
+    if level == Level.DOES_NOT:
+        sentence = "The parameters are those of no sample, as the model does not describe the data."
+        findings.append(Finding("parameters", Severity.WARNING, sentence))
     for name, estimate in result.estimates.items():
         if estimate.verdict.startswith("at "):
             sentence = (

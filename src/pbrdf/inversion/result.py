@@ -21,6 +21,7 @@ from pbrdf.inversion.optimum import Optimum
 from pbrdf.inversion.plausibility import Finding, plausibility
 from pbrdf.inversion.profile import Profile, profile
 from pbrdf.inversion.strategy import Stage
+from pbrdf.inversion.verdict import Verdict, verdict
 from pbrdf.presentation import presenter_of
 
 if TYPE_CHECKING:
@@ -184,6 +185,10 @@ class FitResult(Optimum):
     def plausibility(self, dataset: xr.Dataset | None = None) -> list[Finding]:
         """Physical plausibility, see :func:`pbrdf.inversion.plausibility.plausibility`."""
         return plausibility(self, dataset)
+
+    def verdict(self) -> Verdict:
+        """What the fit is worth, see :func:`pbrdf.inversion.verdict.verdict`."""
+        return verdict(self)
 
     def error_analysis(self) -> ErrorAnalysis:
         """Residuals as in the paper's section 2.3, see :mod:`pbrdf.inversion.erroranalysis`."""

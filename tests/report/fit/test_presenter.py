@@ -9,7 +9,7 @@ import pytest
 
 from pbrdf.report.fit.checks import run_checks
 from pbrdf.report.fit.subject import Report
-from pbrdf.report.fit.summary import summary_text
+from pbrdf.report.fit.summary import summary_text, verdict_in_words
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +37,8 @@ def test_a_notebook_shows_a_table_of_the_parameters(result):
     html = result._repr_html_()
     assert html.count("<tr>") == 1 + len(result.estimates)
     for name, estimate in result.estimates.items():
-        assert f"<td>{name}</td>" in html and f"<td>{estimate.verdict}</td>" in html
+        assert f"<td>{name}</td>" in html and f"<td>{verdict_in_words(estimate)}</td>" in html
+    assert html.index(result.verdict().sentence) < html.index("<table>")
     assert "held out, predicted: median error of the intensity" in html
     assert not re.search(r"<(?!/?(div|table|thead|tbody|tr|th|td|p)>)", html)
 

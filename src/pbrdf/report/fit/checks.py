@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from pbrdf.inversion.conventions_check import contradicted_conventions
+from pbrdf.inversion.suggestions import TIME, Suggestion, suggestions
+from pbrdf.inversion.verdict import Level
 from pbrdf.report.numbers import shown_unit
 
 if TYPE_CHECKING:
@@ -22,6 +26,9 @@ if TYPE_CHECKING:
 
 __all__ = ["Checks", "run_checks"]
 
+#: Share of the time for trials that may go to other readings of the data.
+_FOR_CONVENTIONS = 0.5
+
 
 @dataclass(frozen=True)
 class Checks:
@@ -35,6 +42,10 @@ class Checks:
         None where they were not asked for.
     contours
         Joint regions of the pairs that were asked for.
+    conventions
+        Readings of the data, other than that stated or assumed, under which the model fits them better.
+    suggestions
+        Other ways to fit that a quick trial found better.
     """
 
     plausibility: list[Finding]
@@ -44,6 +55,12 @@ class Checks:
     bootstrap: Bootstrap | None = None
     cross_validation: CrossValidation | None = None
     contours: list[Contour] = field(default_factory=list)
+    conventions: list[Suggestion] = field(default_factory=list)
+    suggestions: list[Suggestion] = field(default_factory=list)
+
+    def advice(self) -> list[str]:
+        """What to try next, the conventions that the data contradict first."""
+        return [s.sentence for s in (*self.conventions, *self.suggestions)]
 
     def record(self, result: FitResult) -> dict[str, Any]:
         """The findings in types that JSON has, angles in degrees."""
@@ -58,6 +75,8 @@ class Checks:
                 "sentences": self.identifiability.sentences,
             },
             "error_analysis": self.errors.sentences(),
+            "conventions": [asdict(s) for s in self.conventions],
+            "suggestions": [asdict(s) for s in self.suggestions],
         }
         if self.profile is not None:
             record["profile"] = {
@@ -107,6 +126,7 @@ def run_checks(
     bootstrap: int = 0,
     cross_validate: str | None = None,
     contours: Sequence[tuple[str, str]] = (),
+    suggest: bool = False,
     fit_arguments: dict[str, Any] | None = None,
 ) -> Checks:
     """Look at a fit from all sides.
@@ -123,8 +143,10 @@ def run_checks(
         How to fold the data, see :func:`pbrdf.inversion.crossvalidation.cross_validate`; None for not.
     contours
         Pairs of free parameters whose joint confidence regions to find.
+    suggest
+        Whether to look for what would describe the data better, where the model does not: a few seconds.
     fit_arguments
-        Arguments of the fit, for the folds.
+        Arguments of the fit, for folds and trials.
 
     Raises
     ------
@@ -137,6 +159,16 @@ def run_checks(
         from pbrdf.inversion.crossvalidation import cross_validate as run_folds
 
         folds = run_folds(dataset, by=cross_validate, **(fit_arguments or {}))
+    conventions: list[Suggestion] = []
+    advice: list[Suggestion] = []
+    if suggest and result.verdict().level != Level.DESCRIBES:
+        now = time.monotonic()
+        until = now + TIME
+        conventions = contradicted_conventions(
+            dataset, result, fit_arguments or {}, until=now + _FOR_CONVENTIONS * TIME
+        )
+        if not conventions:
+            advice = suggestions(dataset, result, fit_arguments or {}, until=until)
     return Checks(
         plausibility=result.plausibility(dataset),
         identifiability=result.identifiability(),
@@ -145,4 +177,6 @@ def run_checks(
         bootstrap=result.bootstrap(bootstrap) if bootstrap else None,
         cross_validation=folds,
         contours=regions,
+        conventions=conventions,
+        suggestions=advice,
     )

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from pbrdf.inversion.estimates import Estimate
+    from pbrdf.inversion.verdict import Verdict
 
 __all__ = [
     "FIGURE_FORMATS",
@@ -94,6 +95,7 @@ def fit_record(report: Report) -> dict[str, Any]:
             "held_out_geometries": int(result.comparison["held_out"].values.sum()),
         },
         "settings": dict(report.settings),
+        "verdict": verdict_record(result.verdict()),
         "model": result.model.to_dict(),
         "estimates": {name: _estimate(e) for name, e in result.estimates.items()},
         "correlation": {
@@ -117,6 +119,17 @@ def fit_record(report: Report) -> dict[str, Any]:
         "checks": None if report.checks is None else report.checks.record(result),
     }
     return plain(record)  # type: ignore[return-value]
+
+
+def verdict_record(verdict: Verdict) -> dict[str, Any]:
+    """A verdict in types that JSON has."""
+    return {
+        "level": str(verdict.level),
+        "sentence": verdict.sentence,
+        "reasons": verdict.reasons,
+        "do_not_quote": verdict.do_not_quote,
+        "strata": [{**asdict(s), "fails": s.fails} for s in verdict.strata],
+    }
 
 
 def _estimate(estimate: Estimate) -> dict[str, Any]:

@@ -11,11 +11,12 @@ from pbrdf.files.atomic import require_writable_folder
 from pbrdf.inversion.estimates import Estimate
 from pbrdf.inversion.holdout import Prediction
 from pbrdf.inversion.result import FitResult
+from pbrdf.inversion.verdict import Level
 from pbrdf.report.fit.checks import run_checks
 from pbrdf.report.fit.figure import fit_figure
 from pbrdf.report.fit.folder import write_report
 from pbrdf.report.fit.subject import Report
-from pbrdf.report.fit.summary import summary_text
+from pbrdf.report.fit.summary import summary_text, verdict_in_words
 from pbrdf.report.numbers import brief, per_cent, shown_unit, with_error
 
 if TYPE_CHECKING:
@@ -34,12 +35,15 @@ def summary(result: FitResult, *, verbose: bool = False) -> str:
 
 def html(result: FitResult) -> str:
     """A table of the parameters, and in a line each how well they describe and predict the data."""
-    rows = "".join(_row(name, estimate) for name, estimate in result.estimates.items())
+    verdict = result.verdict()
+    described = verdict.level != Level.DOES_NOT
+    rows = "".join(_row(name, estimate, described) for name, estimate in result.estimates.items())
     head = "".join(f"<th>{title}</th>" for title in ("parameter", "value", "unit", "verdict", "meaning"))
     sentences = [f"{result.model.name} fitted to {result.goodness.data} values of {_name(result)}"]
     sentences += _errors("fitted", result.fitted) + _errors("held out, predicted", result.predicted)
     lines = "".join(f"<p>{escape(sentence)}</p>" for sentence in [*sentences, *result.notes])
-    return f"<div><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>{lines}</div>"
+    first = f"<p>{escape(verdict.sentence)}</p>"
+    return f"<div>{first}<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>{lines}</div>"
 
 
 def figure(result: FitResult) -> Figure:
@@ -73,13 +77,13 @@ def _errors(what: str, by_region: dict[str, Prediction]) -> list[str]:
     return [sentence]
 
 
-def _row(name: str, estimate: Estimate) -> str:
+def _row(name: str, estimate: Estimate, described: bool) -> str:
     factor, unit = shown_unit(estimate.parameter)
     cells = (
         name,
         with_error(factor * estimate.value, factor * estimate.std),
         unit,
-        estimate.verdict,
+        verdict_in_words(estimate, described=described),
         estimate.parameter.description,
     )
     return f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in cells)}</tr>"

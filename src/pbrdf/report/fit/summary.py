@@ -12,6 +12,7 @@ import numpy as np
 from pbrdf.inversion.comparison import NEAR_SPECULAR, near_specular_tilt
 from pbrdf.inversion.estimates import Estimate
 from pbrdf.inversion.result import FitResult
+from pbrdf.inversion.verdict import Level, Verdict
 from pbrdf.report.dataset.describe import cautions, illumination_in_words, wavelengths_in_words
 from pbrdf.report.fit.subject import Report
 from pbrdf.report.numbers import brief, per_cent, shown_unit, with_error
@@ -51,6 +52,9 @@ _LARGE = 0.5
 _NARROW = 100
 
 _TEXT_WIDTH = 110
+_NOTHING_HELD_OUT = (
+    "nothing, so that no prediction was tested: try --hold-out theta_i=… or --cross-validate theta_i"
+)
 
 
 def summary_text(report: Report, *, verbose: bool = False) -> str:
@@ -65,7 +69,7 @@ def summary_text(report: Report, *, verbose: bool = False) -> str:
 
 
 def print_summary(report: Report, console: Console, *, verbose: bool = False) -> None:
-    """Print what was fitted, the parameters, how well they fit and predict, and what to know about them.
+    """Print what the fit is worth, how well it predicts and fits, the parameters, and what to know about them.
 
     Parameters
     ----------
@@ -83,9 +87,21 @@ def _parts(report: Report, verbose: bool, wide: bool) -> Iterator[RenderableType
     from rich.text import Text
 
     result = report.result
-    yield _headed(_heading(report))
+    verdict = result.verdict()
+    yield _headed([("Verdict", [verdict.sentence]), ("", verdict.reasons)])
     yield ""
-    yield _parameter_table(result, wide)
+    if not result.predicted:
+        yield _headed([("Held out", [_NOTHING_HELD_OUT])])
+        yield ""
+    yield _error_table(result)
+    yield Text("; ".join(_remarks_on_errors(result)), style="italic")
+    yield ""
+    yield _parameter_table(result, wide, verdict)
+    yield ""
+    if report.checks is not None and (advice := report.checks.advice()):
+        yield _headed([("Try next" if i == 0 else "", [line]) for i, line in enumerate(advice)])
+        yield ""
+    yield _headed(_heading(report))
     yield ""
     sections = [
         ("Correlation", correlation_in_words(result)),
@@ -96,9 +112,6 @@ def _parts(report: Report, verbose: bool, wide: bool) -> Iterator[RenderableType
     if verbose and result.correlation.size:
         yield ""
         yield _correlation_table(result)
-    yield ""
-    yield _error_table(result)
-    yield Text("; ".join(_remarks_on_errors(result)), style="italic")
     if report.checks is not None:
         yield from _check_parts(report.checks, result, verbose)
     notes = [*result.notes, *cautions(report.dataset)]
@@ -193,7 +206,7 @@ def _heading(report: Report) -> list[tuple[str, list[str]]]:
     if len(result.stages) > 1:
         rows.append(("Steps", [", then ".join(f"{s.name} ({s.points} geometries)" for s in result.stages)]))
     if result.hold_out is not None:
-        rows.append(("Held out", [f"{result.hold_out}: {held} geometries, predicted below"]))
+        rows.append(("Held out", [f"{result.hold_out}: {held} geometries"]))
     return rows
 
 
@@ -223,7 +236,7 @@ def _headed(rows: list[tuple[str, list[str]]]) -> Table:
     return table
 
 
-def _parameter_table(result: FitResult, wide: bool) -> Table:
+def _parameter_table(result: FitResult, wide: bool, of: Verdict) -> Table:
     from rich.text import Text
 
     table = bare_table()
@@ -246,19 +259,30 @@ def _parameter_table(result: FitResult, wide: bool) -> Table:
         value = with_error(factor * e.value, factor * e.std)
         if e.verdict == "undetermined":
             value = f"({brief(factor * e.value, 3)})"
-        verdict = Text(verdict_in_words(e), style=style)
+        described = of.level != Level.DOES_NOT
+        verdict = Text(verdict_in_words(e, described=described), style=style if described else "yellow")
         table.add_row(label, *meaning, value, unit, limits, verdict)
     return table
 
 
-def verdict_in_words(estimate: Estimate) -> str:
-    """What the data say about one parameter, for example ``determined to 0.4 %``."""
+def verdict_in_words(estimate: Estimate, *, described: bool = True) -> str:
+    """What the data say about one parameter, for example ``determined to 0.4 %``.
+
+    Parameters
+    ----------
+    estimate
+        The parameter.
+    described
+        Whether the model describes the data; if not, nothing is determined.
+    """
     if estimate.verdict == "undetermined":
         return "not determined by these data"
     if estimate.verdict.startswith("at "):
         return f"at its {estimate.verdict.removeprefix('at ')}"
     if estimate.verdict == "fixed":
         return "fixed"
+    if not described:
+        return "do not quote"
     share = estimate.std / abs(estimate.value) if estimate.value else math.inf
     # A parameter that may have either sign is not known "to 300 %" when it is near 0.
     if estimate.lower < 0.0 < estimate.upper:
@@ -389,7 +413,7 @@ def _error_table(result: FitResult) -> Table:
     heads = ["intensity\nmedian", "\nrms", "\nlargest", *(["DoLP\nrms", "\nlargest"] if polarised else [])]
     for head in heads:
         table.add_column(head, justify="right")
-    for what, regions in (("fitted", result.fitted), ("predicted", result.predicted)):
+    for what, regions in (("predicted", result.predicted), ("fitted", result.fitted)):
         for region, p in regions.items():
             cells = [per_cent(p.intensity_median), per_cent(p.intensity_rms), per_cent(p.intensity_max)]
             if polarised:
