@@ -94,6 +94,7 @@ class _GaussianFacets(Model):
     """What both models share: Gaussian facets on a coating of index n − iκ over a body of the MRPV shape."""
 
     parameters: ClassVar[tuple[Parameter, ...]] = _PARAMETERS
+    ablations: ClassVar[Mapping[str, Mapping[str, float]]] = {"unpolarised body": {"t": 0.0}}
     gaussian_slopes: ClassVar[bool] = True
 
     def for_rendering(self) -> Self:
@@ -145,6 +146,7 @@ class DoubleGauss(_GaussianFacets):
         "shadowing": _SHADOWING,
         "accuracy": _ACCURACY,
     }
+    readings: ClassVar[Mapping[str, Mapping[str, str]]] = {"visible": {"normalization": "visible"}}
 
     @classmethod
     def fit_bounds(cls, parameter: Parameter, options: Mapping[str, str]) -> tuple[float, float]:
