@@ -94,8 +94,8 @@ class _GaussianFacets(Model):
     """What both models share: Gaussian facets on a coating of index n − iκ over a body of the MRPV shape."""
 
     parameters: ClassVar[tuple[Parameter, ...]] = _PARAMETERS
-    ablations: ClassVar[Mapping[str, Mapping[str, float]]] = {"unpolarised body": {"t": 0.0}}
     gaussian_slopes: ClassVar[bool] = True
+    ablations: ClassVar[Mapping[str, Mapping[str, float]]] = {"unpolarised body": {"t": 0.0}}
 
     def for_rendering(self) -> Self:
         """``fast`` where that is exact enough."""
