@@ -185,8 +185,6 @@ class Resampling:
         self.units = int(unit.max()) + 1
         drawn = np.random.default_rng(seed).integers(0, self.units, (RESAMPLES, self.units))
         self._times = np.stack([np.bincount(row, minlength=self.units) for row in drawn])
-        # K units spread by (K − 1)/K of what the population they stand for does
-        self._inflation = math.sqrt(self.units / (self.units - 1)) if self.units > 1 else math.nan
 
     def scores(self, errors: PointErrors) -> np.ndarray:
         """Score of each resample, shape (RESAMPLES,); NaN where a resample holds nothing."""
@@ -207,9 +205,9 @@ class Resampling:
     def uncertainty(self, scores: np.ndarray) -> float:
         """Standard uncertainty of what was computed of each resample; NaN for a single unit, or without numbers."""
         kept = scores[np.isfinite(scores)]
-        if len(kept) < 0.9 * len(scores):
+        if self.units < 2 or len(kept) < 0.9 * len(scores):
             return math.nan
-        return float(kept.std(ddof=1)) * self._inflation
+        return float(kept.std(ddof=1))
 
     def paired(
         self, first: PointErrors, second: PointErrors, scores: tuple[np.ndarray, np.ndarray] | None = None

@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pbrdf.data.validation import validate
-from pbrdf.errors import FitError
-from pbrdf.inversion.crossvalidation import cross_validate, divide
+from pbrdf.errors import FitError, PbrdfError
+from pbrdf.inversion.crossvalidation import SCHEMES, cross_validate, divide
 from pbrdf.inversion.estimates import Estimate
 from pbrdf.inversion.fit import fit
 from pbrdf.inversion.heldout_errors import Paired, PointErrors, Resampling, score, units_of
@@ -341,6 +341,8 @@ def compare_models(
         hold_out = HoldOut.parse(hold_out)
     if hold_out is not None and (by is not None or folds is not None):
         raise FitError("hold_out leaves data out once, by and folds all in turn: give one of the two")
+    if by is not None and by not in SCHEMES:
+        raise FitError(f"by={by!r}: choose one of {', '.join(map(repr, SCHEMES))}")
     if starts < 1:
         raise FitError(f"starts={starts}: at least one start is needed")
     if vary < 0:
@@ -472,11 +474,17 @@ def _run(
         try:
             result, comparison, bad = plan.fit(rung)
         except Exception as error:
-            kind = "" if isinstance(error, FitError) else f"{type(error).__name__}: "
-            failures.append(Failure(rung, f"{kind}{error}"))
+            failures.append(Failure(rung, _reason(error)))
             continue
         errors = PointErrors.of(comparison, result.data.channels, plan.held_out)
         fitted.append(_Fitted(rung, result, comparison, errors, bad, time.perf_counter() - clock))
+
+
+def _reason(error: BaseException) -> str:
+    """What went wrong first: Dr.Jit wraps what a kernel raises."""
+    while error.__cause__ is not None:
+        error = error.__cause__
+    return str(error) if isinstance(error, PbrdfError) else f"{type(error).__name__}: {error}"
 
 
 def _ranked(plan: _Plan, fitted: list[_Fitted], failures: list[Failure], steps: list[Step]) -> Comparison:
