@@ -58,6 +58,7 @@ if TYPE_CHECKING:
     from pbrdf.inversion.bootstrap import bootstrap
     from pbrdf.inversion.contour import contour
     from pbrdf.inversion.identifiability import identifiability
+    from pbrdf.inversion.model_comparison import compare_models as compare
     from pbrdf.inversion.profile import profile
     from pbrdf.inversion.stored_result import load_fit
     from pbrdf.models import (
@@ -118,6 +119,7 @@ _HOME = {
     "bootstrap": "pbrdf.inversion.bootstrap",
     "identifiability": "pbrdf.inversion.identifiability",
     "cross_validate": "pbrdf.inversion",
+    "compare": "pbrdf.inversion.model_comparison:compare_models",
     "error_analysis": "pbrdf.inversion",
     "plausibility": "pbrdf.inversion",
     "directional_hemispherical_reflectance": "pbrdf.models.reflectance",
@@ -181,6 +183,7 @@ __all__ = [
     "calibrate_instrument",
     "check",
     "coherency_eigenvalues",
+    "compare",
     "contour",
     "cross_validate",
     "directional_hemispherical_reflectance",

@@ -18,6 +18,7 @@ from typer.core import TyperGroup
 
 from pbrdf.cli.calibrate import calibrate
 from pbrdf.cli.check import check
+from pbrdf.cli.compare import compare
 from pbrdf.cli.console import fail, warn
 from pbrdf.cli.convert import convert
 from pbrdf.cli.doctor import doctor
@@ -122,6 +123,7 @@ def options(
 
 
 app.command(cls=ReadingCommand)(fit)
+app.command(cls=ReadingCommand)(compare)
 app.command()(simulate)
 app.command()(calibrate)
 app.command()(polarimeter)

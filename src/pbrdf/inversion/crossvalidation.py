@@ -27,7 +27,7 @@ from pbrdf.models import DoubleGauss, Model
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["SCHEMES", "CrossValidation", "Fold", "cross_validate"]
+__all__ = ["SCHEMES", "CrossValidation", "Fold", "cross_validate", "divide"]
 
 #: Ways to divide a data set into folds.
 SCHEMES = ("group", "theta_i", "angle", "fraction")
@@ -197,7 +197,7 @@ def cross_validate(
     if folds is not None and folds < 2:
         raise FitError(f"folds={folds}: at least two folds are needed")
     full = fit(dataset, model, starts=starts, seed=seed, max_iterations=max_iterations, **arguments)
-    number, labels = _divide(dataset, by, folds, seed)
+    number, labels = divide(dataset, by, folds, seed)
     held = [number == k for k in range(len(labels))]
     data = [_without(full.data, mask) for mask in held]
     for label, masked in zip(labels, data, strict=True):
@@ -265,8 +265,19 @@ def _without(data: Observations, mask: np.ndarray) -> Observations:
     return replace(data, std=np.where(mask, np.inf, data.std))
 
 
-def _divide(dataset: xr.Dataset, by: str, folds: int | None, seed: int) -> tuple[np.ndarray, list[str]]:
-    """Number of the fold of each geometry, shape (G,), and what each fold leaves out in words."""
+def divide(dataset: xr.Dataset, by: str, folds: int | None, seed: int) -> tuple[np.ndarray, list[str]]:
+    """Number of the fold of each geometry, shape (G,), and what each fold leaves out in words.
+
+    Parameters
+    ----------
+    dataset, by, folds, seed
+        As of :func:`cross_validate`.
+
+    Raises
+    ------
+    FitError
+        If the data cannot be divided so.
+    """
     if by == "fraction":
         return _parts(dataset.sizes["geometry"], folds or DEFAULT_FOLDS, seed)
     if by == "angle":

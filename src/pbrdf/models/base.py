@@ -48,6 +48,12 @@ class Model:
         The parameters, in the order of fits and tables.
     options
         Choices of the model by name (:class:`Option`), the default first.
+    readings
+        Options by the name of a reading beside that of the defaults, ``{"visible": {"normalization": "visible"}}``:
+        each is a model of its own in a comparison.
+    ablations
+        Parameters held at a value by the name of the assumption that they then make,
+        ``{"unpolarised body": {"t": 0.0}}``: a comparison tells what it costs.
     gaussian_slopes
         Whether the two slopes of the facets are normal variables with :meth:`lobe_width` as standard deviation; a
         renderer then draws the specular part from them alone.
@@ -60,6 +66,8 @@ class Model:
     name: ClassVar[str]
     parameters: ClassVar[tuple[Parameter, ...]] = ()
     options: ClassVar[Mapping[str, Option]] = {}
+    readings: ClassVar[Mapping[str, Mapping[str, str]]] = {}
+    ablations: ClassVar[Mapping[str, Mapping[str, float]]] = {}
     gaussian_slopes: ClassVar[bool] = False
 
     values: Mapping[str, Any]
@@ -312,6 +320,15 @@ def _check_declaration(cls: type[Model]) -> None:
             raise TypeError(
                 f"{cls.__name__}: {p.name} is the extinction of {p.extinction_of!r}, which is missing"
             )
+    for reading, chosen in cls.readings.items():
+        for option, choice in chosen.items():
+            if choice not in cls.options.get(option, ()):
+                raise TypeError(f"{cls.__name__}: the reading {reading!r} has no choice {option}={choice!r}")
+    domains = {p.name: p.domain for p in cls.parameters}
+    for ablation, held in cls.ablations.items():
+        for name, value in held.items():
+            if name not in domains or not domains[name][0] <= value <= domains[name][1]:
+                raise TypeError(f"{cls.__name__}: the ablation {ablation!r} cannot hold {name} at {value:g}")
 
 
 def _signature(cls: type[Model]) -> inspect.Signature:

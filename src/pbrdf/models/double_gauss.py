@@ -124,6 +124,7 @@ class _GaussianFacets(Model):
         POLARISED_SHARE,
     )
     gaussian_slopes: ClassVar[bool] = True
+    ablations: ClassVar[Mapping[str, Mapping[str, float]]] = {"unpolarised body": {"t": 0.0}}
 
     def for_rendering(self) -> Self:
         """``fast`` where that is exact enough."""
@@ -172,6 +173,7 @@ class DoubleGauss(_GaussianFacets):
         "shadowing": _SHADOWING,
         "accuracy": _ACCURACY,
     }
+    readings: ClassVar[Mapping[str, Mapping[str, str]]] = {"visible": {"normalization": "visible"}}
 
     @classmethod
     def fit_bounds(cls, parameter: Parameter, options: Mapping[str, str]) -> tuple[float, float]:
