@@ -14,7 +14,7 @@ def svg():
         figure = new_figure(4.0, 3.0)
         ax = figure.subplots()
         ax.plot([0.0, 1.0], [0.0, 1.0], color="black", marker="o", markerfacecolor="white")
-        ax.plot([0.0, 1.0], [1.0, 0.0], color="#0072B2")
+        ax.plot([0.0, 1.0], [1.0, 0.0], color="#D55E00")
         ax.set_title("θ < 1")
     return inline_svg(figure, 'rises & "falls"', "first")
 
@@ -36,7 +36,7 @@ def test_it_fetches_nothing_and_its_names_are_its_own(svg):
 def test_black_and_white_are_those_of_the_page_and_curves_keep_their_colour(svg):
     assert not re.search("(fill|stroke): #(000000|ffffff)", svg)
     assert "currentColor" in svg and "var(--paper)" in svg
-    assert "#0072b2" in svg
+    assert "#d55e00" in svg
 
 
 def test_very_many_points_become_a_picture():

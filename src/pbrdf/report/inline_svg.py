@@ -1,14 +1,14 @@
 """A figure as SVG within a page: it takes the page's colours, light or dark, and says what it shows.
 
 Matplotlib's black, white and the grey of its grid become the page's ink, paper and grid (variables of ``page.css``);
-the colours of curves stay. Identifiers are made unique, so that several figures can stand in one page.
+the colours of most curves stay. Identifiers are made unique, so that several figures can stand in one page.
 """
 
 from __future__ import annotations
 
 import io
 import re
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from pbrdf.report.style import styled
 
@@ -18,13 +18,21 @@ if TYPE_CHECKING:
 
 __all__ = ["inline_svg"]
 
-#: Points of one line from which on it is put in as a picture: the page would become too large.
+#: Points of a panel from which on they are put in as a picture: the page would become too large.
 _MANY_POINTS = 1500
 _DOTS_PER_INCH = 160
 #: CSS pixels per point, as browsers count.
 _PIXELS_PER_POINT = 4.0 / 3.0
 #: Part of its natural width below which a figure is no longer legible: it scrolls in its box then.
 _LEGIBLE = 0.72
+#: What becomes a colour of the page; dark blue and dark green are hard to see on black.
+_PAGE_COLOURS = {
+    "#000000": "currentColor",
+    "#ffffff": "var(--paper)",
+    "#e4e4e4": "var(--grid)",
+    "#0072b2": "var(--curve-blue)",
+    "#009e73": "var(--curve-green)",
+}
 _FONTS = "system-ui, 'DejaVu Sans', sans-serif"
 
 
@@ -34,7 +42,7 @@ def inline_svg(figure: Figure, alternative: str, name: str) -> Markup:
     Parameters
     ----------
     figure
-        What to draw; curves of very many points in it are turned into pictures.
+        What to draw; the points of panels that have very many become pictures.
     alternative
         What it shows, for those who do not see it.
     name
@@ -44,9 +52,7 @@ def inline_svg(figure: Figure, alternative: str, name: str) -> Markup:
     from markupsafe import Markup, escape
 
     for ax in figure.axes:
-        for line in ax.get_lines():
-            if len(line.get_xdata()) > _MANY_POINTS and line.get_linestyle() == "None":  # type: ignore[arg-type]
-                line.set_rasterized(True)
+        _keep_small(ax)
     drawn = io.StringIO()
     with styled():
         matplotlib.rcParams["svg.fonttype"] = "none"  # text stays text: small, searchable, sharp
@@ -70,6 +76,15 @@ def inline_svg(figure: Figure, alternative: str, name: str) -> Markup:
         f'height="{height:.0f}" style="min-width:{_LEGIBLE * width:.0f}px"><title>{escape(alternative)}</title>'
         f"{body}</svg>"
     )
+
+
+def _keep_small(ax: Any) -> None:
+    """Have the points of a panel put in as a picture, with their error bars, if they are very many."""
+    points = [line for line in ax.get_lines() if line.get_linestyle() == "None"]
+    bars = [c for c in ax.collections if hasattr(c, "get_segments")]
+    if sum(len(line.get_xdata()) for line in points) > _MANY_POINTS:
+        for artist in (*points, *bars):
+            artist.set_rasterized(True)
 
 
 def _in_colours_of_the_page(body: str) -> str:

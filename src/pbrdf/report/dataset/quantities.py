@@ -16,6 +16,8 @@ __all__ = ["Channel", "is_element", "is_intensity", "polarised_quantities", "qua
 
 #: Standard uncertainties that the polarised light must exceed for its angle to be drawn.
 _DETECTED = 2.0
+#: Degree of linear polarisation below which light has no angle worth drawing.
+_UNPOLARISED = 0.002
 
 
 @dataclass(frozen=True)
@@ -105,5 +107,7 @@ def _angle(q: Channel, u: Channel) -> Channel:
         angle = 0.5 * np.rad2deg(np.arctan2(u.measured, q.measured))
         angle = np.where(angle < -45.0, angle + 180.0, angle)
         spread = np.rad2deg(0.5 * across / degree)
-    hidden = (degree == 0.0) | (degree < _DETECTED * np.fmax(np.nan_to_num(q.std), np.nan_to_num(u.std)))
+    hidden = (degree < _UNPOLARISED) | (
+        degree < _DETECTED * np.fmax(np.nan_to_num(q.std), np.nan_to_num(u.std))
+    )
     return Channel(np.where(hidden, np.nan, angle), np.where(hidden, np.nan, spread))

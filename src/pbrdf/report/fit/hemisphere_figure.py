@@ -44,7 +44,7 @@ def hemisphere_figure(report: Report) -> Figure | None:
     measured = points.measured
     if (~in_plane(measured)).sum() < _FEWEST:
         return None
-    groups = list(dict.fromkeys(measured.group))
+    groups = sorted(dict.fromkeys(measured.group), key=_number)
     held = [g for g in groups if points.held_out[measured.group == g].any()][:1]
     others = [g for g in groups if g not in held]
     even = np.linspace(0, len(others) - 1, min(len(others), _MOST_GROUPS - len(held))).round().astype(int)
@@ -90,6 +90,14 @@ def hemisphere_figure(report: Report) -> Figure | None:
                 if name == "intensity"
                 else "DoLP: model − measured"
             )
-            figure.colorbar(drawn, ax=list(row), label=label, shrink=0.85, extend="both")
+            figure.colorbar(drawn, ax=list(row), label=label, shrink=0.8, aspect=14.0, extend="both")
         figure.suptitle(title, fontsize=11.0)
         return figure
+
+
+def _number(group: str) -> float:
+    """Groups that are angles go by their size, others stay in the order of the file."""
+    try:
+        return float(group)
+    except ValueError:
+        return 0.0
