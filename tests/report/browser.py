@@ -40,10 +40,15 @@ class Browser:
         # the protocol wants the numbers 3 and 4: first out of their way
         inward, outward = (fcntl.fcntl(fd, fcntl.F_DUPFD, 20) for fd in (commands[0], answers[1]))
         self._log = (profile.parent / "chromium.log").open("wb")
-        renumber = "import os, sys; os.dup2(int(sys.argv[1]), 3); os.dup2(int(sys.argv[2]), 4); os.execv(sys.argv[3], sys.argv[3:])"
+        renumber = (
+            "import os, sys; os.dup2(int(sys.argv[1]), 3); os.dup2(int(sys.argv[2]), 4); "
+            "os.execv(sys.argv[3], sys.argv[3:])"
+        )
         self._process = subprocess.Popen(
-            [sys.executable, "-c", renumber, str(inward), str(outward), program, *FLAGS]
-            + [f"--user-data-dir={profile}", "about:blank"],
+            [
+                *(sys.executable, "-c", renumber, str(inward), str(outward)),
+                *(program, *FLAGS, f"--user-data-dir={profile}", "about:blank"),
+            ],
             pass_fds=(inward, outward),
             stdin=subprocess.DEVNULL,
             stdout=self._log,

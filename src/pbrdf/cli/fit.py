@@ -173,10 +173,7 @@ def fit(
     from pbrdf.report.fit.folder import parse_formats, write_report
     from pbrdf.report.fit.subject import Report
 
-    try:
-        parse_formats(figure_format)
-    except PbrdfError as error:
-        raise PbrdfError(f"--figure-format: {error}") from error
+    parse_formats(figure_format, "--figure-format")
     arguments: dict[str, Any] = {
         "options": pairs(option or (), "--option", "shadowing=smith"),
         "fix": numbers(fix or (), "--fix", "n=1.5"),

@@ -82,8 +82,8 @@ def write_report(
     return [directory / name for name in (PAGE, *names)]
 
 
-def parse_formats(text: str) -> list[str]:
-    """Formats of figures by name, ``"png"`` or ``"png,pdf"``.
+def parse_formats(text: str, option: str = "figure_format") -> list[str]:
+    """Formats of figures by name, ``"png"`` or ``"png,pdf"``; ``option`` names what they were given for.
 
     Raises
     ------
@@ -93,7 +93,7 @@ def parse_formats(text: str) -> list[str]:
     formats = list(dict.fromkeys(part.strip() for part in text.split(",")))
     if not set(formats) <= set(FIGURE_FORMATS):
         raise PbrdfError(
-            f"format of figures {text!r}: choose one of {', '.join(FIGURE_FORMATS)}, or several: png,pdf"
+            f"{option} {text!r}: choose one of {', '.join(FIGURE_FORMATS)}, or several, for example png,pdf"
         )
     return formats
 

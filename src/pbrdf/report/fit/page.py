@@ -1,4 +1,4 @@
-"""A fit as one page: what was measured and fitted, how sure it is, what it predicts, where it fails, how to repeat it."""
+"""A fit as one page: what was measured and fitted, how sure, what it predicts, where it fails, how to repeat it."""
 
 from __future__ import annotations
 
