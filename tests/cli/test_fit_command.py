@@ -1,3 +1,4 @@
+import hashlib
 import json
 
 import pytest
@@ -20,17 +21,23 @@ def test_a_bundled_paint(run, tmp_path, expected):
     assert "Written to matte-white-thick-fit/" in result.stdout
     folder = tmp_path / "matte-white-thick-fit"
     assert {p.name for p in folder.iterdir()} == {
+        "index.html",
         "summary.txt",
         "figure.png",
+        "polarisation.png",
         "starts.png",
         "model.json",
         "fit.json",
         "comparison.nc",
         "fit.nc",
     }
+    command = "pbrdf fit matte-white-thick --hold-out group=3 --starts 4"
+    assert command in (folder / "index.html").read_text(encoding="utf-8")
     record = json.loads((folder / "fit.json").read_text(encoding="utf-8"))
     for name, estimate in expected.estimates.items():
         assert record["estimates"][name]["value"] == pytest.approx(estimate.value, rel=1e-12)
+    assert record["command"] == command
+    assert record["data"]["sha256"] is None
     assert pbrdf.load_model(folder / "model.json") == pbrdf.load_model(record["model"])
     summary = (folder / "summary.txt").read_text(encoding="utf-8")
     assert " ".join(summary.split()) in " ".join(result.stdout.split())
@@ -62,6 +69,9 @@ def test_every_option_reaches_the_fit(run, tmp_path):
     assert record["settings"]["reading"] == {"select": ["theta_i=50"]}
     assert record["data"]["geometries"] == 21
     assert (tmp_path / "out" / "figure.svg").exists()
+    digest = hashlib.sha256((tmp_path / "data.csv").read_bytes()).hexdigest()
+    assert record["data"]["sha256"] == digest
+    assert digest in (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
 
 
 @pytest.mark.slow

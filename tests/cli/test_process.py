@@ -11,7 +11,18 @@ import pytest
 import pbrdf
 
 COMMAND = "from pbrdf.cli.main import main; main()"
-HEAVY = {"matplotlib", "scipy", "xarray", "drjit", "dask", "pandas", "h5py", "mitsuba", "rich.progress"}
+HEAVY = {
+    "matplotlib",
+    "jinja2",
+    "scipy",
+    "xarray",
+    "drjit",
+    "dask",
+    "pandas",
+    "h5py",
+    "mitsuba",
+    "rich.progress",
+}
 
 
 def process(*arguments, cwd: Path, **environment: str) -> subprocess.CompletedProcess:
@@ -40,6 +51,19 @@ def test_help_and_import_load_nothing_heavy(code):
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
     assert done.returncode == 0
     assert done.stderr == ""
+
+
+def test_a_fit_without_figures_loads_no_plotting_library(tmp_path):
+    code = (
+        "import pbrdf.cli.main as m; m.app(['fit', 'white', '--starts', '1', '-q', '--no-figures', '-o', 'out'], "
+        "standalone_mode=False); import sys; sys.stderr.write(' '.join(n for n in sys.modules if 'matplotlib' in n))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=120
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (0, "out\n", "")
+    assert not list((tmp_path / "out").glob("*.png"))
+    assert "No figures were drawn" in (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
 
 
 def test_the_entry_point_is_main():

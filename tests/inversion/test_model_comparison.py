@@ -42,7 +42,7 @@ def simulated(model, theta_i=(20.0, 35.0, 50.0, 65.0), channels="IQU", noise=0.0
     i, r = (a.ravel() for a in np.meshgrid(np.deg2rad(theta_i), np.deg2rad(np.arange(-60.0, 80.0, 10.0))))
     angles = i, np.abs(r), np.where(r < 0.0, np.pi, 0.0)
     stokes = model.stokes(*angles)
-    std = {c: noise * stokes[:, 0] for c in channels}
+    std = dict.fromkeys(channels, noise * stokes[:, 0])
     values = {c: stokes[:, "IQU".index(c)] + std[c] * rng.standard_normal(len(i)) for c in channels}
     return pbrdf.make_dataset(*angles, quantity="brdf", **values, std=std)
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from pbrdf.cli.command_line import command_line
 from pbrdf.cli.console import output_console, progress_bar
 from pbrdf.cli.options import (
     Backend,
@@ -150,7 +151,13 @@ def fit(
             show_default="<file>-fit",
         ),
     ] = None,
-    figure_format: Annotated[str, typer.Option(help="Format of the figures: png, pdf or svg.")] = "png",
+    figure_format: Annotated[
+        str, typer.Option(help="Format of the figures: png, pdf or svg, or several: png,pdf.")
+    ] = "png",
+    figures: Annotated[
+        bool,
+        typer.Option("--figures/--no-figures", help="Draw no figures: a page of numbers, sooner done."),
+    ] = True,
     backend: Backend = None,
     verbose: Annotated[
         bool, typer.Option("--verbose", "-v", help="Show the full correlation matrix.")
@@ -159,21 +166,21 @@ def fit(
 ) -> None:
     """Fit a model to measured data, and say what the fit is worth and how well each parameter is known.
 
-    Writes a folder with summary.txt, figure.png, model.json, fit.json (all numbers), comparison.nc
-    (measured, modelled, residual), fit.nc (all of the fit, for pbrdf.load_fit) and starts.png, and with
-    --contour contours.png.
+    Writes a folder with a page (index.html: open it in a browser), summary.txt, model.json, fit.json (all numbers),
+    comparison.nc (measured, modelled, residual), fit.nc (for pbrdf.load_fit) and the figures: figure.png, starts.png,
+    polarisation.png and hemisphere.png where there is such data, contours.png with --contour.
 
     With bundled data: `pbrdf fit matte-white-thick --hold-out group=3`
 
     With your own: `pbrdf fit paint.csv --column I=f_r_per_sr --noise 3%,1% --fix n=1.5`
     """
     from pbrdf.files.atomic import require_writable_folder
+    from pbrdf.files.digest import sha256_of
     from pbrdf.report.fit.checks import run_checks
-    from pbrdf.report.fit.folder import FIGURE_FORMATS, write_report
+    from pbrdf.report.fit.folder import parse_formats, write_report
     from pbrdf.report.fit.subject import Report
 
-    if figure_format not in FIGURE_FORMATS:
-        raise PbrdfError(f"--figure-format {figure_format!r}: choose one of {', '.join(FIGURE_FORMATS)}")
+    parse_formats(figure_format, "--figure-format")
     arguments: dict[str, Any] = {
         "options": pairs(option or (), "--option", "shadowing=smith"),
         "fix": numbers(fix or (), "--fix", "n=1.5"),
@@ -228,8 +235,10 @@ def fit(
         except FitError as error:
             raise FitError(f"{file}: {error}") from error
         settings = {"model": model, **arguments, "reading": reading.stated()}
-        report = Report(result, dataset, file, settings, checks)
-        written = write_report(report, folder, figure_format=figure_format)
+        report = Report(
+            result, dataset, file, settings, checks, command=command_line(), sha256=sha256_of(Path(file))
+        )
+        written = write_report(report, folder, figure_format=figure_format, figures=figures)
         if quiet:
             print(folder)
             continue

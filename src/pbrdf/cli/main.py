@@ -18,6 +18,7 @@ from typer.core import TyperGroup
 
 from pbrdf.cli.calibrate import calibrate
 from pbrdf.cli.check import check
+from pbrdf.cli.command_line import remember_arguments
 from pbrdf.cli.compare import compare
 from pbrdf.cli.console import fail, warn
 from pbrdf.cli.convert import convert
@@ -45,6 +46,10 @@ USER_ERROR = 2
 
 class _Commands(TyperGroup):
     """The group of all commands; turns errors that a user can mend into one line and exit code 2."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        remember_arguments(args)
+        return super().parse_args(ctx, args)
 
     def invoke(self, ctx: Any) -> Any:
         try:

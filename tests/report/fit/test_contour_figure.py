@@ -78,7 +78,7 @@ def test_the_figure_and_the_thresholds_are_part_of_the_report(report, tmp_path):
     result, dataset = report.result, report.dataset
     whole = Report(result, dataset, "paint", {}, run_checks(result, dataset, contours=[("t", "n")]))
     names = [path.name for path in write_report(whole, tmp_path / "fit")]
-    assert names[-1] == "contours.png"
+    assert "contours.png" in names
     assert (tmp_path / "fit" / "contours.png").stat().st_size > 10_000
     (record,) = whole.checks.record(report.result)["contours"]
     assert record["parameters"] == ["t", "n"]

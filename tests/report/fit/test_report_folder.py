@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 import pbrdf
-from pbrdf.errors import DataError
+from pbrdf.errors import DataError, PbrdfError
 from pbrdf.report.fit import folder as module
 from pbrdf.report.fit.folder import (
     comparison_file,
@@ -15,7 +15,8 @@ from pbrdf.report.fit.folder import (
     write_report,
 )
 
-NAMES = {"summary.txt", "figure.png", "model.json", "fit.json", "comparison.nc", "starts.png", "fit.nc"}
+NUMBERS = {"index.html", "summary.txt", "model.json", "fit.json", "comparison.nc", "fit.nc"}
+NAMES = NUMBERS | {"figure.png", "polarisation.png", "starts.png"}
 
 
 @pytest.fixture(scope="module")
@@ -74,6 +75,27 @@ def test_the_comparison_leaves_the_result_alone(report):
     before = report.result.comparison.copy(deep=True)
     comparison_file(report)
     xr.testing.assert_identical(report.result.comparison, before)
+
+
+def test_figures_come_in_every_format_that_is_asked_for(hemisphere_report, tmp_path):
+    written = write_report(hemisphere_report, tmp_path / "fit", figure_format="png, pdf")
+    figures = {f"{name}.{kind}" for name in ("figure", "hemisphere", "starts") for kind in ("png", "pdf")}
+    assert {path.name for path in written} == NUMBERS | figures
+    assert all(path.is_file() for path in written)
+
+
+@pytest.mark.parametrize("text", ["gif", "png,gif", ""])
+def test_an_unknown_format_is_refused_before_anything_is_written(report, tmp_path, text):
+    with pytest.raises(PbrdfError, match="choose one of png, pdf, svg"):
+        write_report(report, tmp_path / "fit", figure_format=text)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_without_figures_the_page_says_so(report, tmp_path):
+    written = write_report(report, tmp_path / "fit", figures=False)
+    assert {path.name for path in written} == NUMBERS
+    text = (tmp_path / "fit" / "index.html").read_text(encoding="utf-8")
+    assert "<svg" not in text and "No figures were drawn" in text
 
 
 def test_other_files_of_a_folder_are_left_alone(report, tmp_path):

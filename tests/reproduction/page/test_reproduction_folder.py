@@ -105,7 +105,7 @@ def test_the_page_shows_failures_and_needs_nothing_but_itself(folder, reproducti
     assert text.count("✗ outside") == sum(not n.within for n in reproduction.numbers)
     for entry in reproduction.statements:
         assert f"<td>{entry.statement.number}</td>" in text
-    assert "about the paper&#x27;s measured data only" in text.lower()
+    assert "about the paper&#39;s measured data only" in text.lower()
     assert "not comparable" in text
 
 

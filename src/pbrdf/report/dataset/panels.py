@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pbrdf.report.dataset.points import Points
+from pbrdf.report.dataset.quantities import is_intensity, quantity_label
 from pbrdf.report.dataset.shown_cuts import ShownCuts
 from pbrdf.report.numbers import brief
+from pbrdf.report.style import GREY
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,6 +27,7 @@ __all__ = [
     "point_label",
     "remark",
     "scale_intensity",
+    "scale_signed",
 ]
 
 #: Width and height of a panel of points, inches.
@@ -37,6 +40,9 @@ _FEW_DECADES = 2.5
 _FROM_ZERO = 0.4
 #: Part of the value that 95 % exceed, below which a logarithmic axis does not reach.
 _DARK = 0.2
+
+#: Half the least range of an axis of shares such as Q/I.
+_SMALLEST_SPAN = 0.005
 
 VIEWING_ANGLE = "viewing angle θr (°), negative on the source's side"
 _INCIDENCE = "angle of incidence θi (°)"
@@ -56,11 +62,11 @@ def cut_panel(
     shown
         The cuts to draw.
     name
-        ``"intensity"`` or ``"dolp"``.
+        ``"intensity"``, ``"dolp"`` or one of :attr:`Points.polarised`.
     held_out
         Points to draw with open markers, shape (G,); None for none.
     """
-    channel = points.channels[name]
+    channel = points.channel(name)
     for cut, look in zip(shown.cuts, shown.looks, strict=True):
         held = np.zeros(cut.rows.shape, dtype=bool) if held_out is None else held_out[cut.rows]
         for chosen, filled in ((~held, True), (held, False)):
@@ -81,10 +87,12 @@ def cut_panel(
             )
     ax.set_xlabel(cut_axis_label(shown))
     ax.set_ylabel(channel_label(name, points))
-    if name == "intensity":
+    if is_intensity(name):
         scale_intensity(ax, channel.measured[np.concatenate([cut.rows for cut in shown.cuts])])
-    else:
+    elif name == "dolp":
         ax.set_ylim(0.0, min(ax.get_ylim()[1], 1.05))
+    else:
+        scale_signed(ax, name)
 
 
 def cut_axis_label(shown: ShownCuts) -> str:
@@ -104,6 +112,8 @@ def channel_label(name: str, points: Points) -> str:
     """Name of a channel with its unit, for an axis."""
     if name == "dolp":
         return "degree of linear polarisation"
+    if name != "intensity":
+        return quantity_label(name)
     return "intensity (arbitrary scale)" if points.arbitrary_scale else "intensity (1/sr)"
 
 
@@ -139,6 +149,18 @@ def scale_intensity(ax: Axes, measured: np.ndarray, modelled: np.ndarray | None 
     if lost:
         limit = f"below {brief(floor, 2)}" if floor >= positive.min() else "≤ 0"
         remark(ax, f"{lost} measured value{'s' if lost > 1 else ''} {limit} not shown")
+
+
+def scale_signed(ax: Axes, name: str) -> None:
+    """Scale the axis of a quantity that has a sign, or of the angle of linear polarisation, to what was drawn."""
+    if name == "aolp":
+        ax.set_ylim(-45.0, 135.0)
+        ax.set_yticks([-45.0, 0.0, 45.0, 90.0, 135.0], ["−45", "0 (p)", "45", "90 (s)", "135"])
+        return
+    ax.axhline(0.0, color=GREY, linewidth=0.8, zorder=1)
+    low, high = ax.get_ylim()
+    # what is 0 but for rounding must not look like noise
+    ax.set_ylim(max(min(low, -_SMALLEST_SPAN), -1.05), min(max(high, _SMALLEST_SPAN), 1.05))
 
 
 def _label_within_decades(axis: Any) -> None:

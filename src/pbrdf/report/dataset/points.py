@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,25 +11,12 @@ import numpy as np
 from pbrdf.data.covariance import correlations
 from pbrdf.data.schema import COVARIANCE
 from pbrdf.data.select import to_brdf_scale
+from pbrdf.report.dataset.quantities import Channel, polarised_quantities
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Channel", "Points", "dolp_uncertainty", "error_correlation"]
-
-
-@dataclass(frozen=True)
-class Channel:
-    """Intensity or DoLP over the geometries; NaN where there is nothing.
-
-    Attributes
-    ----------
-    measured, std
-        Values and their standard uncertainties, shape (G,).
-    """
-
-    measured: np.ndarray
-    std: np.ndarray
+__all__ = ["Points", "dolp_uncertainty", "error_correlation"]
 
 
 @dataclass(frozen=True)
@@ -46,6 +34,8 @@ class Points:
         measured.
     arbitrary_scale
         Whether the intensity has an unknown constant factor.
+    polarised
+        What else was measured of polarised light, see :func:`pbrdf.report.dataset.quantities.polarised_quantities`.
     """
 
     theta_i: np.ndarray
@@ -55,11 +45,16 @@ class Points:
     intensity: Channel
     dolp: Channel | None
     arbitrary_scale: bool
+    polarised: Mapping[str, Channel] = field(default_factory=dict)
 
     @property
     def channels(self) -> dict[str, Channel]:
         """What was measured, by name: ``"intensity"`` and, if it was measured, ``"dolp"``."""
         return {"intensity": self.intensity} | ({} if self.dolp is None else {"dolp": self.dolp})
+
+    def channel(self, name: str) -> Channel:
+        """One of :attr:`channels` or :attr:`polarised`."""
+        return self.channels[name] if name in self.channels else self.polarised[name]
 
     @classmethod
     def from_dataset(cls, dataset: xr.Dataset) -> Points:
@@ -74,9 +69,11 @@ class Points:
             M = ds["mueller"].values
             S = np.array(column("mueller_std") if "mueller_std" in ds else np.full(M.shape, np.nan))
             stokes, std = [M[:, i, 0] for i in range(3)], [S[:, i, 0] for i in range(3)]
+            entries = {f"m{i}{j}": (M[:, i, j], S[:, i, j]) for i in range(4) for j in range(4)}
         else:
             stokes = [column(name) for name in "IQU"]
             std = [column(f"{name}_std") for name in "IQU"]
+            entries = {name: (column(name), column(f"{name}_std")) for name in "IQUV"}
         dolp = None
         if "dolp" in ds:
             dolp = Channel(column("dolp"), column("dolp_std"))
@@ -93,6 +90,10 @@ class Points:
             intensity=Channel(stokes[0], std[0]),
             dolp=dolp,
             arbitrary_scale=ds.attrs.get("scale") == "arbitrary",
+            polarised=polarised_quantities(
+                {name: value for name, (value, _) in entries.items()},
+                {name: spread for name, (_, spread) in entries.items()},
+            ),
         )
 
 

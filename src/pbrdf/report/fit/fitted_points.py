@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pbrdf.report.dataset.points import Channel, Points, dolp_uncertainty, error_correlation
+from pbrdf.report.dataset.points import Points, dolp_uncertainty, error_correlation
+from pbrdf.report.dataset.quantities import Channel, polarised_quantities
 
 if TYPE_CHECKING:
     from pbrdf.report.fit.subject import Report
@@ -25,7 +26,8 @@ class FittedPoints:
     measured
         The points.
     modelled
-        Values of the model, shape (G,), by the name of the channel as in :attr:`Points.channels`.
+        Values of the model, shape (G,), by the name of the channel as in :attr:`Points.channels` and
+        :attr:`Points.polarised`.
     held_out
         Whether the fit left the point out, shape (G,).
     diffuse
@@ -64,9 +66,24 @@ class FittedPoints:
                     else error_correlation(report.dataset),
                 )
             dolp = Channel(column("dolp_measured"), std)
+        names = [str(n).removesuffix("_measured") for n in comparison if str(n).endswith("_measured")]
+        polarised = polarised_quantities(
+            {name: column(f"{name}_measured") for name in names},
+            {name: column(f"{name}_std") for name in names},
+        )
+        modelled = polarised_quantities({name: column(f"{name}_modelled") for name in names})
         return cls(
-            measured=replace(bare, intensity=Channel(column("I_measured"), column("I_std")), dolp=dolp),
-            modelled={"intensity": column("I_modelled"), "dolp": column("dolp_modelled")},
+            measured=replace(
+                bare,
+                intensity=Channel(column("I_measured"), column("I_std")),
+                dolp=dolp,
+                polarised=polarised,
+            ),
+            modelled={
+                "intensity": column("I_modelled"),
+                "dolp": column("dolp_modelled"),
+                **{name: modelled[name].measured for name in polarised},
+            },
             held_out=comparison["held_out"].values,
             diffuse=comparison["used_for_diffuse"].values if "used_for_diffuse" in comparison else None,
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,31 +11,41 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pbrdf.data.degrees import exact_degrees
+from pbrdf.errors import PbrdfError
 from pbrdf.files.atomic import atomic_folder
 from pbrdf.inversion.stored_result import FILE_NAME, write_result
+from pbrdf.report.fit.page import page_text
 from pbrdf.report.fit.subject import Report
 from pbrdf.report.fit.summary import summary_text
 from pbrdf.report.numbers import plain, shown_unit
+from pbrdf.report.page import figure as framed
 from pbrdf.version import __version__
 
 if TYPE_CHECKING:
     import xarray as xr
+    from markupsafe import Markup
 
     from pbrdf.inversion.estimates import Estimate
     from pbrdf.inversion.verdict import Verdict
 
 __all__ = [
     "FIGURE_FORMATS",
+    "PAGE",
     "comparison_file",
     "fit_record",
+    "parse_formats",
     "write_report",
 ]
 
 FIGURE_FORMATS = ("png", "pdf", "svg")
+#: Name of the page in the folder of a fit.
+PAGE = "index.html"
 
 
-def write_report(report: Report, directory: Path, *, figure_format: str = "png") -> list[Path]:
-    """Write the model, the numbers, the comparison, the figures and the summary of a fit, all or nothing.
+def write_report(
+    report: Report, directory: Path, *, figure_format: str = "png", figures: bool = True
+) -> list[Path]:
+    """Write the page, the model, the numbers, the comparison, the figures and the summary of a fit, all or nothing.
 
     Parameters
     ----------
@@ -43,7 +54,9 @@ def write_report(report: Report, directory: Path, *, figure_format: str = "png")
     directory
         The folder; made if it is missing.
     figure_format
-        ``"png"``, ``"pdf"`` or ``"svg"``.
+        ``"png"``, ``"pdf"`` or ``"svg"``, or several of them with commas between.
+    figures
+        Whether figures are drawn; without them no plotting library is loaded, and the page says so.
 
     Returns
     -------
@@ -55,26 +68,51 @@ def write_report(report: Report, directory: Path, *, figure_format: str = "png")
     DataError
         If the folder cannot be written.
     """
-    from pbrdf.report.fit.contour_figure import contour_figure
-    from pbrdf.report.fit.figure import fit_figure
-    from pbrdf.report.fit.starts_figure import starts_figure
-    from pbrdf.report.style import save_figure
-
-    names = ["summary.txt", f"figure.{figure_format}", "model.json", "fit.json", "comparison.nc"]
-    names += [f"starts.{figure_format}", FILE_NAME]
+    formats = parse_formats(figure_format)
     with atomic_folder(directory, fill=True) as temporary:
         (temporary / "summary.txt").write_text(summary_text(report), encoding="utf-8")
-        save_figure(fit_figure(report), temporary / f"figure.{figure_format}")
         report.result.model.to_json(temporary / "model.json")
         record = json.dumps(fit_record(report), indent=2, ensure_ascii=False, allow_nan=False)
         (temporary / "fit.json").write_text(record + "\n", encoding="utf-8")
         comparison_file(report).to_netcdf(temporary / "comparison.nc", engine="h5netcdf")
-        save_figure(starts_figure(report), temporary / f"starts.{figure_format}")
         write_result(report.result, temporary / FILE_NAME)
-        if report.checks is not None and report.checks.contours:
-            save_figure(contour_figure(report), temporary / f"contours.{figure_format}")
-            names.append(f"contours.{figure_format}")
-    return [directory / name for name in names]
+        drawn = _write_figures(report, temporary, formats) if figures else {}
+        pictures = [f"{name}.{kind}" for name in drawn for kind in formats]
+        names = ["summary.txt", *pictures, "model.json", "fit.json", "comparison.nc", FILE_NAME]
+        (temporary / PAGE).write_text(page_text(report, drawn, names), encoding="utf-8")
+    return [directory / name for name in (PAGE, *names)]
+
+
+def parse_formats(text: str, option: str = "figure_format") -> list[str]:
+    """Formats of figures by name, ``"png"`` or ``"png,pdf"``; ``option`` names what they were given for.
+
+    Raises
+    ------
+    PbrdfError
+        If one of them is not known.
+    """
+    formats = list(dict.fromkeys(part.strip() for part in text.split(",")))
+    if not set(formats) <= set(FIGURE_FORMATS):
+        raise PbrdfError(
+            f"{option} {text!r}: choose one of {', '.join(FIGURE_FORMATS)}, or several, for example png,pdf"
+        )
+    return formats
+
+
+def _write_figures(report: Report, folder: Path, formats: Sequence[str]) -> dict[str, Markup]:
+    """Draw and save the figures; returns them as pieces of the page by name."""
+    from pbrdf.report.fit.pictures import pictures
+    from pbrdf.report.inline_svg import inline_svg
+    from pbrdf.report.style import save_figure
+
+    drawn = {}
+    for picture in pictures(report):
+        files = [f"{picture.name}.{kind}" for kind in formats]
+        for name in files:
+            save_figure(picture.figure, folder / name)
+        image = inline_svg(picture.figure, picture.alternative, picture.name)
+        drawn[picture.name] = framed(image, picture.caption, files)
+    return drawn
 
 
 def fit_record(report: Report) -> dict[str, Any]:
@@ -93,7 +131,9 @@ def fit_record(report: Report) -> dict[str, Any]:
             },
             "geometries": report.dataset.sizes["geometry"],
             "held_out_geometries": int(result.comparison["held_out"].values.sum()),
+            "sha256": report.sha256 or None,
         },
+        "command": report.command or None,
         "settings": dict(report.settings),
         "verdict": verdict_record(result.verdict()),
         "model": result.model.to_dict(),

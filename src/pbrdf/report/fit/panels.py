@@ -14,6 +14,7 @@ from pbrdf.report.dataset.panels import (
     remark,
     scale_intensity,
 )
+from pbrdf.report.dataset.quantities import is_intensity
 from pbrdf.report.dataset.shown_cuts import ShownCuts
 from pbrdf.report.fit.fitted_points import FittedPoints
 from pbrdf.report.numbers import brief
@@ -42,7 +43,7 @@ def fitted_cut_panel(
     shown
         The cuts to draw.
     name
-        ``"intensity"`` or ``"dolp"``.
+        ``"intensity"``, ``"dolp"`` or one of :attr:`Points.polarised`.
     curves
         The model along each cut's path.
     """
@@ -59,7 +60,7 @@ def fitted_cut_panel(
         )
     cut_panel(ax, points.measured, shown, name, points.held_out)
     if points.diffuse is not None:
-        measured = points.measured.channels[name].measured
+        measured = points.measured.channel(name).measured
         for cut in shown.cuts:
             used = points.diffuse[cut.rows]
             ax.plot(
@@ -75,7 +76,7 @@ def fitted_cut_panel(
 
 def difference_panel(ax: Axes, points: FittedPoints, shown: ShownCuts, name: str) -> None:
     """Model − measured against the angle, relative for the intensity; parameters as of :func:`fitted_cut_panel`."""
-    measured = points.measured.channels[name].measured
+    measured = points.measured.channel(name).measured
     differences = points.modelled[name] - measured
     if name == "intensity":
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -109,10 +110,10 @@ def agreement_panel(ax: Axes, points: FittedPoints, looks: dict[str, Look], name
     looks
         How to draw each group.
     """
-    measured, modelled = points.measured.channels[name].measured, points.modelled[name]
+    measured, modelled = points.measured.channel(name).measured, points.modelled[name]
     many = measured.size > _MANY_POINTS
     usable = np.isfinite(measured) & np.isfinite(modelled)
-    if name == "intensity":
+    if is_intensity(name):
         usable &= measured > 0.0
     for filled in (True, False):  # the few that were held out are drawn over the many that were not
         for group, look in looks.items():
@@ -132,7 +133,7 @@ def agreement_panel(ax: Axes, points: FittedPoints, looks: dict[str, Look], name
     values = np.concatenate([measured[usable], modelled[usable]])
     ends = np.array([values.min(), values.max()]) if values.size else np.array([0.0, 1.0])
     ax.plot(ends, ends, color="black", linewidth=0.9, zorder=4, label="equal")
-    if name == "intensity":
+    if is_intensity(name):
         for factor in (0.8, 1.25):
             ax.plot(ends, factor * ends, color=GREY, linewidth=0.8, linestyle=":", zorder=4, label="25 % off")
         ax.annotate("dotted: 25 % apart", (0.97, 0.04), xycoords="axes fraction", ha="right", fontsize=8.5)

@@ -14,7 +14,7 @@ from pbrdf.inversion.result import FitResult
 from pbrdf.inversion.verdict import Level
 from pbrdf.report.fit.checks import run_checks
 from pbrdf.report.fit.figure import fit_figure
-from pbrdf.report.fit.folder import write_report
+from pbrdf.report.fit.folder import parse_formats, write_report
 from pbrdf.report.fit.subject import Report
 from pbrdf.report.fit.summary import summary_text, verdict_in_words
 from pbrdf.report.numbers import brief, per_cent, shown_unit, with_error
@@ -53,6 +53,7 @@ def figure(result: FitResult) -> Figure:
 
 def save(result: FitResult, folder: Path, figure_format: str = "png") -> list[Path]:
     """Write the folder of ``pbrdf fit``."""
+    parse_formats(figure_format)
     require_writable_folder(folder)
     return write_report(_report(result), folder, figure_format=figure_format)
 

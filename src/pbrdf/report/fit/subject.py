@@ -31,6 +31,10 @@ class Report:
         How the fit was asked for, in plain values; kept with the numbers so that they can be had again.
     checks
         What else was looked at; None if nothing.
+    command
+        The line for a shell that asked for the fit; empty where none did.
+    sha256
+        Of the file of data, hexadecimal; empty where there is no single file.
     """
 
     result: FitResult
@@ -38,3 +42,5 @@ class Report:
     name: str
     settings: Mapping[str, Any] = field(default_factory=dict)
     checks: Checks | None = None
+    command: str = ""
+    sha256: str = ""

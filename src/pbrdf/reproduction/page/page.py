@@ -4,10 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from html import escape
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from pbrdf.report.numbers import brief
+from pbrdf.report.page import (
+    Section,
+    bullets,
+    embedded_picture,
+    figure,
+    markup,
+    paragraph,
+    render_page,
+)
 from pbrdf.reproduction import paper
 from pbrdf.reproduction.experiment.sample import Sample
 from pbrdf.reproduction.interpretations import DEFAULT, LITERAL
@@ -18,13 +27,15 @@ from pbrdf.reproduction.page.page_tables import (
     statement_table,
     strongest_table,
 )
-from pbrdf.reproduction.page.pieces import figure, page, paragraph
 from pbrdf.reproduction.page.tables import recovered
 from pbrdf.reproduction.result import Reproduction
 from pbrdf.reproduction.statements.catalogue import Evaluated
 from pbrdf.reproduction.statements.parameters import agreement
 from pbrdf.reproduction.statements.statement import Kind
 from pbrdf.version import __version__
+
+if TYPE_CHECKING:
+    from markupsafe import Markup
 
 __all__ = ["page_text", "verdicts_in_words"]
 
@@ -34,11 +45,11 @@ _SYSTEMATIC = 4.0
 
 def page_text(reproduction: Reproduction, folder: Path) -> str:
     """The page as HTML; pictures are taken from `folder` into the page itself."""
-    return page(
+    return render_page(
         "The double-Gauss pBRDF paper, reproduced",
-        f"{paper.SIMULATED}. Everything here but the paper's own numbers, in grey, was computed from its model and its "
-        "table 1.",
-        _parts(reproduction, folder),
+        _sections(reproduction, folder),
+        banner=f"{paper.SIMULATED}. Everything here but the paper's own numbers, in grey, was computed from its model "
+        "and its table 1.",
     )
 
 
@@ -67,97 +78,117 @@ def verdicts_in_words(statements: Sequence[Evaluated]) -> list[str]:
     return lines
 
 
-def _parts(reproduction: Reproduction, folder: Path) -> Iterator[str]:
+def _sections(reproduction: Reproduction, folder: Path) -> Iterator[Section]:
     samples, options = reproduction.samples, reproduction.options
-    yield paragraph(
-        f"{paper.PAPER} describes a polarimetric BRDF of painted surfaces, measures five paints with an imaging "
-        "polarimeter, and fits the model to two camera positions to predict a third. Here the five paints of its "
-        "table 1 are measured in a simulation (frames of the imager, reduced to Stokes vectors), inverted the "
-        "paper's way, and each of its statements that follows from the model is tested."
-    )
-    yield paragraph(f"Settings: {options.in_words()}. pbrdf {__version__}.")
-    yield (
-        "<ul>"
-        + "".join(f"<li>{escape(line)}</li>" for line in verdicts_in_words(reproduction.statements))
-        + "</ul>"
-    )
 
-    yield "<h2>Figure 3: the model over the hemisphere</h2>"
-    yield _figure(
-        folder,
-        "figure-3",
-        "Polar surfaces of intensity and degree of polarisation, and cuts through the plane of incidence",
-        "Left: distance from the origin is the value, as in the paper; φ = 0° is forward. Right: the plane of "
-        "incidence in all readings of eqs (12), (13).",
+    def picture(name: str, alternative: str, caption: str) -> Markup:
+        files = [f"figures/{name}.{kind}" for kind in ("png", "svg")]
+        return figure(embedded_picture(folder / files[0], alternative), caption, files)
+
+    yield Section(
+        "",
+        [
+            paragraph(
+                f"{paper.PAPER} describes a polarimetric BRDF of painted surfaces, measures five paints with an "
+                "imaging polarimeter, and fits the model to two camera positions to predict a third. Here the five "
+                "paints of its table 1 are measured in a simulation (frames of the imager, reduced to Stokes vectors), "
+                "inverted the paper's way, and each of its statements that follows from the model is tested."
+            ),
+            paragraph(f"Settings: {options.in_words()}. pbrdf {__version__}."),
+            bullets(verdicts_in_words(reproduction.statements)),
+        ],
     )
-
-    yield "<h2>Table 1: parameters, true and recovered</h2>"
-    yield parameter_table(samples)
-    yield from map(paragraph, _starts_in_words(samples))
-    if largest := _largest_pull(samples):
-        yield paragraph(largest)
-
-    yield "<h2>Figures 5 and 7: measurement and model</h2>"
-    yield paragraph(
-        "Points are the simulated measurement, lines the model fitted to positions 1 and 2; position 3 (open, "
-        "broken) was not fitted: it is predicted. Intensities are the first Stokes parameter in digital numbers "
-        "(DN) at the sample's exposure; the frames themselves, behind the analyser, stay below 80 % of the range."
+    yield Section(
+        "Figure 3: the model over the hemisphere",
+        [
+            picture(
+                "figure-3",
+                "Polar surfaces of intensity and degree of polarisation, and cuts through the plane of incidence",
+                "Left: distance from the origin is the value, as in the paper; φ = 0° is forward. Right: the plane of "
+                "incidence in all readings of eqs (12), (13).",
+            )
+        ],
     )
-    for name, what in (("figure-5", "Intensity"), ("figure-7", "Degree of polarisation")):
-        yield _figure(
-            folder, name, f"{what} of five samples against the sample's angle", f"{what}; {paper.SIMULATED}."
-        )
-
-    yield "<h2>Figures 6 and 8: errors</h2>"
-    for name, what in (
-        ("figure-6", "Errors of the intensity"),
-        ("figure-8", "Errors of the degree of polarisation"),
-    ):
-        yield _figure(folder, name, f"{what} of sample 3", f"{what}; {paper.SIMULATED}.")
-    yield error_table(samples)
-    yield paragraph(
-        "Where a sample sends no more than a few DN the measured DoP is noise, and noise polarises: the points far "
-        "above the curves of figure 7 at small Angle_S_I, and the large standard deviations that they make. The "
-        "paper reports the same of its sample 4 at 10° to 30° (#21)."
+    largest = _largest_pull(samples)
+    yield Section(
+        "Table 1: parameters, true and recovered",
+        [
+            parameter_table(samples),
+            *map(paragraph, _starts_in_words(samples)),
+            *([paragraph(largest)] if largest else []),
+        ],
     )
-    yield strongest_table(samples)
-    yield paragraph(
-        "The paper's numbers are errors of the model against real paint; ours are the noise of a simulated "
-        "measurement against the model that made it. They cannot be compared, but one thing can be seen: where the "
-        "diffuse light is polarised by a few per cent, the imager's stated accuracy of 0.01 alone makes relative "
-        "errors of 10 % and more."
+    yield Section(
+        "Figures 5 and 7: measurement and model",
+        [
+            paragraph(
+                "Points are the simulated measurement, lines the model fitted to positions 1 and 2; position 3 (open, "
+                "broken) was not fitted: it is predicted. Intensities are the first Stokes parameter in digital "
+                "numbers (DN) at the sample's exposure; the frames themselves, behind the analyser, stay below 80 % of "
+                "the range."
+            ),
+            *(
+                picture(
+                    name, f"{what} of five samples against the sample's angle", f"{what}; {paper.SIMULATED}."
+                )
+                for name, what in (("figure-5", "Intensity"), ("figure-7", "Degree of polarisation"))
+            ),
+        ],
     )
-    yield paragraph(
-        'The paper names neither its camera nor its scale. Its 17 % at the maximum of position 3 and its "less than 20 '
-        'DN" put that maximum below 120 DN, which suits a camera of eight bits (--bits 8).'
+    yield Section(
+        "Figures 6 and 8: errors",
+        [
+            *(
+                picture(name, f"{what} of sample 3", f"{what}; {paper.SIMULATED}.")
+                for name, what in (
+                    ("figure-6", "Errors of the intensity"),
+                    ("figure-8", "Errors of the degree of polarisation"),
+                )
+            ),
+            error_table(samples),
+            paragraph(
+                "Where a sample sends no more than a few DN the measured DoP is noise, and noise polarises: the points "
+                "far above the curves of figure 7 at small Angle_S_I, and the large standard deviations that they "
+                "make. The paper reports the same of its sample 4 at 10° to 30° (#21)."
+            ),
+            strongest_table(samples),
+            paragraph(
+                "The paper's numbers are errors of the model against real paint; ours are the noise of a simulated "
+                "measurement against the model that made it. They cannot be compared, but one thing can be seen: where "
+                "the diffuse light is polarised by a few per cent, the imager's stated accuracy of 0.01 alone makes "
+                "relative errors of 10 % and more."
+            ),
+            paragraph(
+                'The paper names neither its camera nor its scale. Its 17 % at the maximum of position 3 and its "less '
+                'than 20 DN" put that maximum below 120 DN, which suits a camera of eight bits (--bits 8).'
+            ),
+        ],
     )
-
-    yield "<h2>The paper's statements</h2>"
-    yield paragraph(
-        "Readings: eq. (13) normalises the diffuse light of the facets, weighted by how many there are of each "
-        "(weighted) or over all that are visible, all alike (visible); M_t holds transmittances of the flux or the "
-        f"squared amplitudes that the text literally asks for. {DEFAULT.name} is the default of this software, "
-        f"{LITERAL.name} the letter of the "
-        "paper. Where a column fails, that reading contradicts what the paper reports."
+    yield Section(
+        "The paper's statements",
+        [
+            paragraph(
+                "Readings: eq. (13) normalises the diffuse light of the facets, weighted by how many there are of each "
+                "(weighted) or over all that are visible, all alike (visible); M_t holds transmittances of the flux or "
+                "the squared amplitudes that the text literally asks for. "
+                f"{DEFAULT.name} is the default of this software, {LITERAL.name} the letter of the paper. Where a "
+                "column fails, that reading contradicts what the paper reports."
+            ),
+            statement_table(reproduction.statements),
+        ],
     )
-    yield statement_table(reproduction.statements)
-
-    yield "<h2>Numbers expected of the model</h2>"
-    yield number_table(reproduction.numbers)
-
-    yield "<h2>What is the paper's and what is ours</h2>"
-    yield _provenance()
-    yield "<h2>Files</h2>"
-    yield (
-        "<p><code>data/</code> the simulated measurements (read by <code>pbrdf fit</code>), <code>models/</code> "
-        "the fitted models, <code>tables/</code> every number on this page, <code>figures/</code> the pictures as "
-        "PNG and SVG.</p>"
+    yield Section("Numbers expected of the model", [number_table(reproduction.numbers)])
+    yield Section("What is the paper's and what is ours", _provenance())
+    yield Section(
+        "Files",
+        [
+            markup(
+                "<p><code>data/</code> the simulated measurements (read by <code>pbrdf fit</code>), "
+                "<code>models/</code> the fitted models, <code>tables/</code> every number on this page, "
+                "<code>figures/</code> the pictures as PNG and SVG.</p>"
+            )
+        ],
     )
-
-
-def _figure(folder: Path, name: str, alternative: str, caption: str) -> str:
-    files = [f"figures/{name}.{kind}" for kind in ("png", "svg")]
-    return figure(folder / files[0], alternative, caption, files)
 
 
 def _starts_in_words(samples: Sequence[Sample]) -> list[str]:
@@ -191,7 +222,7 @@ def _largest_pull(samples: Sequence[Sample]) -> str:
     )
 
 
-def _provenance() -> str:
+def _provenance() -> list[Markup]:
     theirs = (
         "the model's equations, table 1, the parameters of figure 3",
         "the protocol: a fixed bistatic angle for each of three camera positions, 21 sample angles, positions 1 "
@@ -206,10 +237,13 @@ def _provenance() -> str:
         "the tests of the statements and their tolerances",
     )
 
-    def items(lines: Sequence[str]) -> str:
-        return "".join(f"<li>{escape(line)}</li>" for line in lines)
-
-    return f"<p>The paper's:</p><ul>{items(theirs)}</ul><p>Ours:</p><ul>{items(ours)}</ul>" + paragraph(
-        "Simulated data follow the model exactly. That the parameters come back and position 3 is predicted shows "
-        "that the inversion works and what the noise does to it, not that real paint obeys the model."
-    )
+    return [
+        paragraph("The paper's:"),
+        bullets(theirs),
+        paragraph("Ours:"),
+        bullets(ours),
+        paragraph(
+            "Simulated data follow the model exactly. That the parameters come back and position 3 is predicted shows "
+            "that the inversion works and what the noise does to it, not that real paint obeys the model."
+        ),
+    ]

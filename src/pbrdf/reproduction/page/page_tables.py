@@ -4,32 +4,36 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from html import escape
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pbrdf.report.numbers import brief, with_error
+from pbrdf.report.page import holds, markup, table
 from pbrdf.reproduction import paper
 from pbrdf.reproduction.experiment.errors import error_numbers, position_errors
 from pbrdf.reproduction.experiment.sample import Sample
 from pbrdf.reproduction.interpretations import INTERPRETATIONS
-from pbrdf.reproduction.page.pieces import table, verdict
 from pbrdf.reproduction.page.tables import recovered
 from pbrdf.reproduction.statements.catalogue import PRINTED, RECOVERED, Evaluated
 from pbrdf.reproduction.statements.expected import Number
 from pbrdf.reproduction.statements.statement import Outcome, signed
 
+if TYPE_CHECKING:
+    from markupsafe import Markup
+
 __all__ = ["error_table", "number_table", "parameter_table", "statement_table", "strongest_table"]
 
 
-def parameter_table(samples: Sequence[Sample]) -> str:
+def parameter_table(samples: Sequence[Sample]) -> Markup:
     """True and recovered parameters of the samples."""
     names = [r.symbol for r in recovered(samples[0])]
-    rows, classes = [], []
+    rows: list[list[str | Markup]] = []
+    classes = []
     for sample in samples:
         found = recovered(sample)
-        rows.append([f"<b>{escape(sample.label)}</b>", "table 1", *(f"{r.true:.4f}" for r in found)])
-        rows.append(["", "recovered ± standard error", *(escape(with_error(r.value, r.std)) for r in found)])
+        rows.append([markup("<b>{}</b>", sample.label), "table 1", *(f"{r.true:.4f}" for r in found)])
+        rows.append(["", "recovered ± standard error", *(with_error(r.value, r.std) for r in found)])
         rows.append(["", "pull", *(signed(r.pull, 1) for r in found)])
         classes += ["first", "", ""]
     return table(
@@ -41,7 +45,7 @@ def parameter_table(samples: Sequence[Sample]) -> str:
     )
 
 
-def error_table(samples: Sequence[Sample]) -> str:
+def error_table(samples: Sequence[Sample]) -> Markup:
     """Errors over all points beside the paper's."""
     rows = [
         [
@@ -58,7 +62,7 @@ def error_table(samples: Sequence[Sample]) -> str:
         peak = float(np.nanmax(sample.intensity))
         rows.append(
             [
-                escape(sample.label),
+                sample.label,
                 f"{brief(intensity.std, 3)} DN",
                 f"{100.0 * intensity.std / peak:.2f} %",
                 f"{signed(100.0 * intensity.share, 2)} %, position {intensity.position}",
@@ -75,7 +79,7 @@ def error_table(samples: Sequence[Sample]) -> str:
     )
 
 
-def strongest_table(samples: Sequence[Sample]) -> str:
+def strongest_table(samples: Sequence[Sample]) -> Markup:
     """Errors at the strongest points beside the paper's."""
     rows: list[list[str]] = []
     classes = []
@@ -90,7 +94,7 @@ def strongest_table(samples: Sequence[Sample]) -> str:
             first = errors.position == 1
             rows.append(
                 [
-                    escape(sample.label) if first else "",
+                    sample.label if first else "",
                     f"{errors.position}" + (" (predicted)" if errors.held_out else ""),
                     *(
                         f"{signed(100.0 * value, digits)} %"
@@ -115,29 +119,32 @@ def strongest_table(samples: Sequence[Sample]) -> str:
     )
 
 
-def statement_table(statements: Sequence[Evaluated]) -> str:
+def statement_table(statements: Sequence[Evaluated]) -> Markup:
     """The statements with their outcomes under every interpretation."""
-    rows: list[list[str | None]] = []
+    rows: list[list[str | Markup | None]] = []
     for entry in statements:
         statement = entry.statement
-        row: list[str | None] = [
+        row: list[str | Markup | None] = [
             str(statement.number),
-            f'{escape(statement.said)}<br><span class="small">Test: {escape(statement.tested)}</span>'
+            markup('{}<br><span class="small">Test: {}</span>', statement.said, statement.tested)
             if entry.outcomes
-            else escape(statement.said),
+            else statement.said,
         ]
         if not entry.outcomes:
-            row += [f'<span class="small">{escape(statement.tested)}</span>', None, None, None]
+            row += [markup('<span class="small">{}</span>', statement.tested), None, None, None]
         elif set(entry.outcomes) <= {PRINTED, RECOVERED}:
             row += [
-                "<br>".join(f"{name}: {_outcome(o)}" for name, o in entry.outcomes.items()),
+                markup("<br>").join(
+                    markup("{}: {}", name, _outcome(o)) for name, o in entry.outcomes.items()
+                ),
                 None,
                 None,
                 None,
             ]
         else:
             row += [
-                _outcome(entry.outcomes[interpretation.name], "<br>") for interpretation in INTERPRETATIONS
+                _outcome(entry.outcomes[interpretation.name], markup("<br>"))
+                for interpretation in INTERPRETATIONS
             ]
         rows.append(row)
     return table(
@@ -147,11 +154,11 @@ def statement_table(statements: Sequence[Evaluated]) -> str:
     )
 
 
-def _outcome(outcome: Outcome, between: str = " ") -> str:
-    return f'{verdict(outcome.passed)}{between}<span class="small">{escape(outcome.text)}</span>'
+def _outcome(outcome: Outcome, between: str = " ") -> Markup:
+    return markup('{}{}<span class="small">{}</span>', holds(outcome.passed), between, outcome.text)
 
 
-def number_table(numbers: Sequence[Number]) -> str:
+def number_table(numbers: Sequence[Number]) -> Markup:
     """Numbers expected of the model."""
 
     def joined(values: Sequence[float]) -> str:
@@ -165,12 +172,12 @@ def number_table(numbers: Sequence[Number]) -> str:
         [
             [
                 str(n.statement),
-                escape(n.quantity),
+                n.quantity,
                 n.interpretation,
                 joined(n.expected),
                 f"± {n.tolerance:.2g}",
                 joined(n.found),
-                '<span class="holds">✓ within</span>' if n.within else '<span class="fails">✗ outside</span>',
+                holds(n.within, "within", "outside"),
             ]
             for n in numbers
         ],
