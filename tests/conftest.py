@@ -27,7 +27,7 @@ def read_oracle(name: str) -> dict[str, np.ndarray]:
     """Columns of a table by name; the Mueller matrices as ``M`` of shape (rows, 4, 4)."""
     with (ORACLE / name).open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
-    words = ("normalization", "transmittance")
+    words = ("normalization", "transmittance", "distribution")
     table = {
         key: np.array([row[key] if key in words else float(row[key]) for row in rows]) for key in rows[0]
     }
@@ -46,6 +46,12 @@ def scatmech_table():
 def double_gauss_table():
     """240 rows: 120 whole-model Mueller matrices in both readings."""
     return read_oracle("double_gauss.csv")
+
+
+@pytest.fixture(scope="session")
+def roughconductor_table():
+    """100 Mueller matrices of Mitsuba's ``roughconductor``, turned to our convention."""
+    return read_oracle("roughconductor_mitsuba.csv")
 
 
 @pytest.fixture(scope="session")
