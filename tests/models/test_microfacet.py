@@ -137,7 +137,7 @@ def test_a_rough_coat_has_no_mirror_and_a_smooth_one_nothing_else():
     one_surface = CookTorranceLambert(0.1, 1.5, 0.0)
     # near the normal Fresnel's reflectance is nearly constant, so that it hardly matters who reflects
     found, expected = (directional_hemispherical_reflectance(m, 0.1) for m in (shared, one_surface))
-    assert found == pytest.approx(expected, rel=0.02)
+    assert found == pytest.approx(expected, rel=0.04)
 
 
 # --- reciprocity and energy, as the docstrings say ---

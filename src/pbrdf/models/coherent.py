@@ -23,7 +23,7 @@ __all__ = ["IncoherentFacets", "MirrorFacetsMRPV"]
 class IncoherentFacets(Facets):
     """Facets that reflect what the mirror image does not: 1 − exp(−g) of it, so that both together are one surface.
 
-    g is that of the steeper of the two rays, of which it is the smaller: reciprocal, and never more than the mirror
+    g is taken at the ray farther from the normal, where it is smaller: reciprocal, and never more than the mirror
     leaves.
     """
 
