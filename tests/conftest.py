@@ -74,6 +74,12 @@ def maignan_table():
 
 
 @pytest.fixture(scope="session")
+def roughconductor_table():
+    """100 Mueller matrices of Mitsuba's ``roughconductor``, turned to our convention."""
+    return read_oracle("roughconductor_mitsuba.csv")
+
+
+@pytest.fixture(scope="session")
 def jit():
     """Turn numbers or arrays into the active backend's float64 Dr.Jit array."""
     from pbrdf.backend import get_backend

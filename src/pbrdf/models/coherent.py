@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
+import drjit as dr
+
 from pbrdf.models.composed import ComposedModel
 from pbrdf.models.parts.facets import Facets, GaussianSlopes
 from pbrdf.models.parts.mirror import HEIGHT, CoherentMirror, coherent_share
@@ -19,24 +21,29 @@ __all__ = ["IncoherentFacets", "MirrorFacetsMRPV"]
 
 
 class IncoherentFacets(Facets):
-    """Facets that reflect what the mirror image does not: 1 − exp(−g) of it, so that both together are one surface."""
+    """Facets that reflect what the mirror image does not: 1 − exp(−g) of it, so that both together are one surface.
+
+    g is taken at the ray farther from the normal, where it is smaller: reciprocal, and never more than the mirror
+    leaves.
+    """
 
     def __init__(self) -> None:
         super().__init__(GaussianSlopes(), ("v-cavity",))
         self.parameters = (*self.parameters, HEIGHT)
 
     def share(self, geometry: Geometry, values: Mapping[str, Any]) -> Any:
-        return 1.0 - coherent_share(geometry.cos_i + geometry.cos_r, values)
+        return 1.0 - coherent_share(dr.minimum(geometry.cos_i, geometry.cos_r), values)
 
     def albedo(self, cos_theta: Any, values: Mapping[str, Any]) -> Any:
-        return super().albedo(cos_theta, values) * (1.0 - coherent_share(2.0 * cos_theta, values))
+        return super().albedo(cos_theta, values) * (1.0 - coherent_share(cos_theta, values))
 
 
 class MirrorFacetsMRPV(ComposedModel):
     """Mirror image of a finite source, Gaussian facets with the rest of its light, and an MRPV body.
 
     For glossy coats whose highlight is narrower than the facets' lobe. Own construction from the named parts.
-    Reciprocal. Energy: mirror and facets together conserve it; the body's amplitude a is not bound.
+    Reciprocal. Energy: mirror and facets together conserve it (some is lost where the facets are steep); the body's
+    amplitude a is not bound.
     """
 
     name: ClassVar[str] = "mirror-facets"

@@ -36,9 +36,9 @@ WIDTH = Parameter(
 )  # fmt: skip
 
 
-def coherent_share(cosines: Any, values: Mapping[str, Any]) -> Any:
-    """exp(−[2π (h/λ) (cosθ_i + cosθ_r)]²), given cosθ_i + cosθ_r."""
-    return dr.exp(-dr.square(2.0 * math.pi * values["mirror_height"] * cosines))
+def coherent_share(cosine: Any, values: Mapping[str, Any]) -> Any:
+    """exp(−g), g = [4π (h/λ) cosθ]²."""
+    return dr.exp(-dr.square(4.0 * math.pi * values["mirror_height"] * cosine))
 
 
 class CoherentMirror(Part):
@@ -55,7 +55,7 @@ class CoherentMirror(Part):
 
     def matrix(self, geometry: Geometry, values: Mapping[str, Any], chosen: Mapping[str, str]) -> Matrix:
         density = projected_area_density(geometry.facet[2], tan2_tilt(geometry), values["mirror_width"])
-        share = coherent_share(geometry.cos_i + geometry.cos_r, values)
+        share = coherent_share(0.5 * (geometry.cos_i + geometry.cos_r), values)
         return facet_reflection(geometry, density, share, values["n"], values["kappa"])
 
     def check(self, values: Mapping[str, Any]) -> None:
@@ -66,4 +66,4 @@ class CoherentMirror(Part):
 
     def albedo(self, cos_theta: Any, values: Mapping[str, Any]) -> Any:
         reflectance = mueller_reflection(cos_theta, values["n"], values["kappa"]).mean
-        return reflectance * coherent_share(2.0 * cos_theta, values)
+        return reflectance * coherent_share(cos_theta, values)
