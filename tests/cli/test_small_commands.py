@@ -101,6 +101,28 @@ def test_a_model_and_data_are_drawn(run, tmp_path, extension):
     assert (tmp_path / f"d.{extension}").stat().st_size > 10_000
 
 
+def test_models_data_and_fits_are_drawn_together(run, tmp_path):
+    run("convert", "white", "data.csv")
+    run("fit", "white", "--starts", 1, "-q", "--no-figures", "-o", "found")
+    assert run("plot", "found").stdout == "found.png\n"
+    for kind in ("curves", "hemisphere", "surface", "mueller"):
+        sources = ["data.csv", "found", "cd-back"] if kind != "surface" else ["found"]
+        assert run("plot", *sources, "--kind", kind, "-o", f"{kind}.png").stdout == f"{kind}.png\n"
+        assert (tmp_path / f"{kind}.png").stat().st_size > 10_000
+    run("plot", "found", "cd-back", "-o", "several.png")
+    assert (tmp_path / "several.png").read_bytes() == _drawn(
+        run, tmp_path, "found", "cd-back", "--kind", "curves"
+    )
+    run(
+        "plot", "data.csv", "white", "--select", "group=1", "-o", "selected.png"
+    )  # reading options are for the data
+
+
+def _drawn(run, folder, *arguments):
+    run("plot", *arguments, "-o", "again.png")
+    return (folder / "again.png").read_bytes()
+
+
 def test_a_figure_is_named_after_what_it_shows(run, tmp_path):
     pbrdf.load_paint("white").to_json(tmp_path / "paint.json")
     assert run("plot", "paint.json").stdout == "paint.png\n"
@@ -115,6 +137,9 @@ def test_a_figure_is_named_after_what_it_shows(run, tmp_path):
         (["white", "-o", "nowhere/x.png"], "there is no folder nowhere"),
         (["white", "--theta-i", "90"], "must be at least 0° and below 90°"),
         (["white", "--quantity", "brdf"], "white is a model: --quantity is for files"),
+        (["white", "cd-back", "--quantity", "brdf"], "white, cd-back are models: --quantity is for files"),
+        (["white", "--theta-i", "95", "--kind", "surface"], "--theta-i 95: the angle must be at least 0°"),
+        (["white", "nothing.csv"], "there is no such file"),
     ],
 )
 def test_mistakes_in_plots_are_explained(refused, arguments, message):

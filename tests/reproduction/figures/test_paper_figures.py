@@ -6,11 +6,12 @@ import matplotlib.image
 import numpy as np
 import pytest
 
+from pbrdf.report.polar_surface import polar_surface
 from pbrdf.report.style import save_figure
 from pbrdf.reproduction.figures.all import pictures
 from pbrdf.reproduction.figures.angles import dop_figure, intensity_figure
 from pbrdf.reproduction.figures.errors import dop_error_figure, intensity_error_figure
-from pbrdf.reproduction.figures.polar import polar_figure, polar_surface
+from pbrdf.reproduction.figures.polar import polar_figure
 from pbrdf.reproduction.paper import SIMULATED
 
 pytestmark = pytest.mark.slow

@@ -9,6 +9,7 @@ import numpy as np
 from pbrdf.models import Model
 from pbrdf.optics.stokes import dolp
 from pbrdf.report.dataset.panels import VIEWING_ANGLE
+from pbrdf.report.polar_surface import draw_polar_surface
 from pbrdf.report.style import GREY, RED, looks_of, styled
 from pbrdf.reproduction.interpretations import DEFAULT, INTERPRETATIONS
 from pbrdf.reproduction.paper import FIGURE_3_INCIDENCE, SIMULATED
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["polar_figure", "polar_surface"]
+__all__ = ["polar_figure"]
 
 #: Zenith angle of the surfaces' rim, degrees: at 90° f is 0.
 _RIM = 89.0
@@ -43,7 +44,7 @@ def polar_figure() -> Figure:
         ):
             bottom = 0.51 - 0.455 * row
             surface: Any = figure.add_axes((0.0, bottom - 0.03, 0.52, 0.45), projection="3d")
-            _surface(surface, theta_r, phi, values)
+            draw_polar_surface(surface, theta_r, phi, values / values.max(), FIGURE_3_INCIDENCE)
             surface.set_title(f"{name}: distance from the origin, up to {values.max():.3g}{unit}", y=0.97)
             cut = figure.add_axes((0.6, bottom + 0.04, 0.37, 0.33))
             (_intensity_cut if row == 0 else _polarisation_cut)(cut)
@@ -57,73 +58,11 @@ def polar_figure() -> Figure:
         return figure
 
 
-def polar_surface(
-    theta_r: np.ndarray, phi: np.ndarray, values: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Points at the distance `values` from the origin in the directions θ_r, φ (radians).
-
-    x points forward, z along the normal.
-    """
-    across = values * np.sin(theta_r)
-    return across * np.cos(phi), across * np.sin(phi), values * np.cos(theta_r)
-
-
 def _hemisphere(model: Model) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """θ_r, φ (radians, broadcast against each other) and Stokes vectors."""
     theta_r = np.deg2rad(np.linspace(0.0, _RIM, 60))[:, None]
     phi = np.deg2rad(np.linspace(-180.0, 180.0, 121))[None, :]
     return theta_r, phi, model.stokes(np.deg2rad(FIGURE_3_INCIDENCE), theta_r, phi)
-
-
-def _surface(ax: Any, theta_r: np.ndarray, phi: np.ndarray, values: np.ndarray) -> None:
-    from matplotlib import colormaps
-
-    r = values / float(values.max())
-    x, y, z = polar_surface(theta_r, phi, r)
-    colours = colormaps["viridis"](0.25 * (r[1:, 1:] + r[1:, :-1] + r[:-1, 1:] + r[:-1, :-1]))
-    surface = ax.plot_surface(
-        x, y, z, facecolors=colours, rstride=1, cstride=1, linewidth=0, antialiased=False, shade=True
-    )
-    surface.set_rasterized(True)
-    turn = np.linspace(0.0, 2.0 * np.pi, 181)
-    for radius in (0.5, 1.0):
-        ax.plot(
-            radius * np.cos(turn), radius * np.sin(turn), 0.0 * turn, color="#BBBBBB", linewidth=0.7, zorder=0
-        )
-    for degrees, label in (
-        (0, "forward\nφ = 0°"),
-        (90, "90°"),
-        (180, "back\n180°"),
-        (-90, "−90°"),
-        (45, "45°"),
-        (135, "135°"),
-        (-45, "−45°"),
-        (-135, "−135°"),
-    ):
-        c, s = np.cos(np.deg2rad(degrees)), np.sin(np.deg2rad(degrees))
-        ax.plot([0.0, c], [0.0, s], [0.0, 0.0], color="#DDDDDD", linewidth=0.6, zorder=0)
-        main = degrees % 90 == 0
-        ax.text(
-            1.2 * c,
-            1.2 * s,
-            0.0,
-            label,
-            ha="center",
-            va="center",
-            fontsize=9 if main else 7.5,
-            color="black" if main else GREY,
-        )
-    incidence = np.deg2rad(FIGURE_3_INCIDENCE)
-    source = 1.15 * np.array([-np.sin(incidence), 0.0, np.cos(incidence)])
-    ax.quiver(*source, *(-0.45 * source), color=RED, linewidth=1.8, arrow_length_ratio=0.25, normalize=False)
-    ax.text(*(1.1 * source), "light", color=RED, ha="center", fontsize=9)
-    mirror = 1.15 * np.array([np.sin(incidence), 0.0, np.cos(incidence)])
-    ax.plot(*zip((0, 0, 0), mirror, strict=True), color=RED, linewidth=1.0, linestyle=":")
-    ax.text(*(1.1 * mirror), "mirror", color=RED, ha="center", fontsize=9)
-    ax.set(xlim=(-0.95, 0.95), ylim=(-0.95, 0.95), zlim=(0.0, 0.95))
-    ax.set_box_aspect((2.0, 2.0, 1.0), zoom=1.35)
-    ax.view_init(elev=28.0, azim=-82.0)
-    ax.set_axis_off()
 
 
 def _grid() -> np.ndarray:
