@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import pytest
 
 import pbrdf
@@ -55,7 +57,7 @@ class HalfGGX(LambertGGX):
     """The same facets; without its body it is another model than the one with a body of 0.5."""
 
     name = "half-ggx"
-    ablations = {"half body": {"rho": 0.5}, "black body": {"rho": 0.0}}
+    ablations: ClassVar = {"half body": {"rho": 0.5}, "black body": {"rho": 0.0}}
 
 
 def test_ablations_that_differ_stay_apart():
