@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import pbrdf
 from own_model import LambertGGX
@@ -178,18 +179,21 @@ def test_where_nothing_describes_the_sample_it_is_said_and_where_it_fails():
     assert found.score_in_words == "median relative error of the intensity"
 
 
+def at_wavelengths(*pairs):
+    """Data sets one after the other, each at a wavelength in nm."""
+    marked = [data.assign_coords(wavelength=("geometry", np.full(56, nm))) for nm, data in pairs]
+    return xr.concat(
+        marked, dim="geometry", data_vars="minimal", coords="minimal", compat="override", join="override"
+    )
+
+
 def test_amplitudes_are_free_for_each_wavelength():
     blue, red = simulated(TRUTH, channels="I"), simulated(TRUTH.replace(a=0.1), channels="I")
-    import xarray as xr
-
-    data = xr.concat([blue.assign_coords(wavelength=("geometry", np.full(56, w))) for w, blue in ((450.0, blue), (650.0, red))],
-                     dim="geometry", data_vars="minimal", coords="minimal", compat="override", join="override")  # fmt: skip
-    found = compare_models(
-        data, [Rung("t = 0", DoubleGauss, fix={"t": 0.0})], hold_out="theta_i=50", vary=0, starts=4
-    )
+    ablated = Rung("t = 0", DoubleGauss, fix={"t": 0.0})
+    data = at_wavelengths((450.0, blue), (650.0, red))
+    found = compare_models(data, [ablated], hold_out="theta_i=50", vary=0, starts=4)
     assert [n for n in found.best.result.space.names if n.startswith("a")] == ["a[450]", "a[650]"]
-    many = xr.concat([data.assign_coords(wavelength=data["wavelength"] + 10.0 * k) for k in range(5)],
-                     dim="geometry", data_vars="minimal", coords="minimal", compat="override", join="override")  # fmt: skip
+    many = at_wavelengths(*((400.0 + 10.0 * k, blue) for k in range(10)))
     with pytest.raises(FitError, match="the data hold 10 wavelengths"):
         compare_models(many, ["double-gauss"])
 
