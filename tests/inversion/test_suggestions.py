@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -162,6 +163,44 @@ def test_every_reading_undoes_itself_or_its_opposite():
             np.testing.assert_allclose(again[name], dataset[name], rtol=1e-12)
         once = change[there](dataset)
         assert any(not np.allclose(once[n], dataset[n]) for n in ("phi", "Q", "I"))
+
+
+def made_up(errors, level=Level.IN_PART, chi2=None):
+    """Trials whose error is looked up by what was asked for, instead of fits."""
+
+    def trial(dataset, clock, **arguments):
+        model = arguments["model"]
+        key = (model.name if isinstance(model, type) else "same", arguments.get("loss", "linear"))
+        error = errors.get(key, 0.4)
+        stratum = SimpleNamespace(where="", quantity="intensity", held_out=True, error=error)
+        return SimpleNamespace(
+            verdict=lambda: SimpleNamespace(strata=[stratum], level=level),
+            space=SimpleNamespace(loss=arguments.get("loss", "linear")),
+            goodness=SimpleNamespace(chi2=100.0 if chi2 is None else chi2.get(key, 100.0)),
+        )
+
+    return trial
+
+
+def test_the_best_model_and_the_best_loss_are_tried_together(monkeypatch):
+    dataset = measured(polarised=False)
+    result = pbrdf.fit(dataset, starts=1)
+    other = "reciprocal-double-gauss"
+    errors = {(other, "linear"): 0.2, ("same", "cauchy"): 0.25, (other, "cauchy"): 0.1}
+
+    def options(**given):
+        monkeypatch.setattr("pbrdf.inversion.suggestions.trial", made_up(**given))
+        return [s.option for s in suggestions(dataset, result, {}, until=math.inf)]
+
+    assert options(errors=errors) == [f"--model {other} --loss cauchy", f"--model {other}", "--loss cauchy"]
+    # together they must be better than the better one alone
+    assert options(errors=errors | {(other, "cauchy"): 0.19}) == [f"--model {other}", "--loss cauchy"]
+    # a fifth at least, no higher χ² of the same kind, and something that describes the data
+    assert options(errors={("same", "cauchy"): 0.33}) == []
+    assert options(errors=errors, chi2={(other, "linear"): 120.0}) == ["--loss cauchy"]
+    assert options(errors=errors, level=Level.DOES_NOT) == []
+    monkeypatch.setattr("pbrdf.inversion.suggestions.MOST", 2)
+    assert len(options(errors=errors)) == 2
 
 
 def test_trials_are_bounded_in_size_and_time():

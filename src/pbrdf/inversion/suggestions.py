@@ -29,7 +29,11 @@ __all__ = ["TIME", "suggestions"]
 TIME = 5.0
 #: A suggestion lowers the error of the trial to this share of what it was.
 GAIN = 0.8
-#: What lowers the error of the polarisation may raise that of the intensity to this share of what it was.
+#: Two together are suggested where the error is this share of what the better one alone leaves.
+TOGETHER = 0.9
+#: So many suggestions are made.
+MOST = 3
+#: What lowers the error of the intensity may raise that of the polarisation, and χ², to this share of what it was.
 NO_WORSE = 1.1
 
 
@@ -55,7 +59,7 @@ def suggestions(
     Returns
     -------
     list of Suggestion
-        The most helpful first; empty where no trial helped.
+        The most helpful first, :data:`MOST` at most; empty where no trial helped.
     """
     clock = Clock(time.monotonic() + TIME if until is None else until)
     used = some_of(dataset)
@@ -65,14 +69,26 @@ def suggestions(
     before = trial(some, clock, **arguments)
     if before is None:
         return []
-    found = []
+    found: list[tuple[float, str, dict[str, Any], Suggestion]] = []
+
+    def attempt(option: str, changes: dict[str, Any], needed: float) -> None:
+        after = trial(some, clock, **{**arguments, **changes}) if clock.allows() else None
+        gain = None if after is None else _gain(before, after)
+        if after is not None and gain is not None and gain <= needed:
+            suggestion = _suggestion(option, before, after, some.sizes["geometry"], dataset)
+            found.append((gain, option, changes, suggestion))
+
     for option, changes in _candidates(dataset, result, fit_arguments):
-        if not clock.allows():
-            break
-        after = trial(some, clock, **{**arguments, **changes})
-        if after is not None and (gain := _gain(before, after)) is not None:
-            found.append((gain, _suggestion(option, before, after, some.sizes["geometry"], dataset)))
-    return [suggestion for _, suggestion in sorted(found, key=lambda pair: pair[0])]
+        attempt(option, changes, GAIN)
+    found.sort(key=lambda one: one[0])
+    # the best model may gain once more by the best of what is no model
+    models = [one for one in found if "model" in one[2]][:1]
+    others = [one for one in found if "model" not in one[2]][:1]
+    for (first, option, changes, _), (second, another, more, _) in zip(models, others, strict=False):
+        fits = all(name in [p.name for p in changes["model"].parameters] for name in more.get("split", {}))
+        if fits:
+            attempt(f"{option} {another}", {**changes, **more}, TOGETHER * min(first, second))
+    return [one[3] for one in sorted(found, key=lambda one: one[0])[:MOST]]
 
 
 def _candidates(
@@ -118,6 +134,9 @@ def _whole(result: FitResult, quantity: str) -> Stratum | None:
 def _gain(before: FitResult, after: FitResult) -> float | None:
     """Error after in units of the error before, of the quantity that gains most; None where neither does enough."""
     if after.verdict().level == Level.DOES_NOT:
+        return None
+    same = before.space.loss == after.space.loss
+    if same and after.goodness.chi2 > NO_WORSE * before.goodness.chi2:
         return None
     ratio = {}
     for quantity in ("intensity", "polarisation"):

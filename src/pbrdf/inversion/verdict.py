@@ -33,7 +33,7 @@ BIAS_TOLERANCE = 0.10
 #: Median error beyond which the numbers of the fit are not those of the sample: half of the signal is missed.
 HOPELESS = 0.50
 #: RMS error of the polarisation (channels over intensity) that is always allowed: twice the 1 % that the imaging
-#: polarimeter of the paper states.
+#: polarimeter of the paper states, for Q and U together; of n channels √(n/2) times that, as their squares are summed.
 POLARISATION_FLOOR = 0.02
 #: Else it may be this share of the measured polarisation (rms), and beyond the second it is as good as not described.
 POLARISATION_TOLERANCE, POLARISATION_HOPELESS = 0.25, 0.80
@@ -235,6 +235,7 @@ def _strata(result: Optimum) -> Iterator[Stratum]:
     uncertain = _in_uncertainties(result)
     parts = list(_parts(result))
     chance = SIGNIFICANCE / max(len(parts), 1)
+    floor = POLARISATION_FLOOR * math.sqrt(max(1.0, 0.5 * len(_polarising(result))))
 
     def judged(where: str, mask: np.ndarray, whole: bool) -> Iterator[Stratum]:
         unseen = bool(held[mask].all())
@@ -267,7 +268,7 @@ def _strata(result: Optimum) -> Iterator[Stratum]:
                 error=_rms(errors[used]),
                 bias=math.nan,
                 signal=signal,
-                tolerance=max(POLARISATION_FLOOR, POLARISATION_TOLERANCE * signal) * (1.0 if whole else 1.5),
+                tolerance=max(floor, POLARISATION_TOLERANCE * signal) * (1.0 if whole else 1.5),
                 in_uncertainties=_rms(uncertain["polarisation"][..., used]),
                 biased=False,
                 grazing=grazing,
