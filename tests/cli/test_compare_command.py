@@ -33,13 +33,14 @@ def test_a_bundled_paint_and_a_model_of_ones_own(run, tmp_path, monkeypatch):
         "AIC",
         "BIC",
         "lambert-ggx",
-        "costs (",
+        "costs",
         "Written to matte-white-thick-compare/",
     ):
         assert text in printed, text
     folder = tmp_path / "matte-white-thick-compare"
     assert {
-        "summary.txt", "comparison.csv", "comparison.json", "best-model.json", "curves.png", "ranking.png",
+        "index.html", "summary.txt", "comparison.csv", "comparison.json", "best-model.json",
+        "curves.png", "ranking.png",
     } <= {p.name for p in folder.iterdir()}  # fmt: skip
     record = json.loads((folder / "comparison.json").read_text(encoding="utf-8"))
     assert {entry["model"] for entry in record["ranking"]} == {

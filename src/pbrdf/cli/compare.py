@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import shlex
-import sys
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
+from pbrdf.cli.command_line import command_line
 from pbrdf.cli.console import output_console, stage_bar
 from pbrdf.cli.options import (
     Backend,
@@ -86,15 +85,16 @@ def compare(
     """Fit many models to the same data and rank them by how they predict what they have not seen.
 
     Same data, same weights, same held-out geometries for all. Says which models cannot be told apart, what each
-    assumption costs, and where the best one fails. Writes a folder with summary.txt, comparison.csv, comparison.json
-    (all numbers), best-model.json, curves.png and ranking.png.
+    assumption costs, and where the best one fails. Writes a folder with a page (index.html: open it in a
+    browser), summary.txt, comparison.csv, comparison.json (all numbers), best-model.json, curves.png and ranking.png.
 
     With bundled data: `pbrdf compare matte-white-thick --models double-gauss`
 
     With your own: `pbrdf compare paint.csv --wavelength 550 --hold-out theta_i=50`
     """
     from pbrdf.files.atomic import require_writable_folder
-    from pbrdf.report.fit.folder import FIGURE_FORMATS
+    from pbrdf.files.digest import sha256_of
+    from pbrdf.report.comparison.folder import FIGURE_FORMATS, write_comparison
 
     if figure_format not in FIGURE_FORMATS:
         raise PbrdfError(f"--figure-format {figure_format!r}: choose one of {', '.join(FIGURE_FORMATS)}")
@@ -111,7 +111,6 @@ def compare(
         set_backend(backend)
 
     from pbrdf.inversion.model_comparison import compare_models
-    from pbrdf.report.comparison.folder import write_comparison
     from pbrdf.report.comparison.subject import Compared
     from pbrdf.report.comparison.summary import print_summary
 
@@ -132,7 +131,7 @@ def compare(
     except FitError as error:
         raise FitError(f"{file}: {error}") from error
     settings = {"models": names, **arguments, "reading": reading.stated()}
-    report = Compared(comparison, file, settings, command=shlex.join(["pbrdf", *sys.argv[1:]]))
+    report = Compared(comparison, file, settings, command_line(), sha256_of(Path(file)))
     written = write_comparison(report, folder, figure_format=figure_format if figures else None)
     if quiet:
         print(folder)

@@ -116,19 +116,20 @@ class Paired:
         First score minus second: positive where the second predicts better.
     uncertainty
         Its standard uncertainty over the units.
-    margin
-        Size of the difference up to which the two cannot be told apart: the uncertainty times the 97.5 % quantile of
-        Student's distribution for the number of units.
+    lower, upper
+        Interval of 95 % for it: percentiles of the resamples, which need not lie evenly about the difference, stretched
+        by what Student's distribution for the number of units is wider than the normal one.
     """
 
     difference: float
     uncertainty: float
-    margin: float
+    lower: float
+    upper: float
 
     @property
     def apart(self) -> bool:
         """Whether the two can be told apart."""
-        return abs(self.difference) > self.margin
+        return self.lower > 0.0 or self.upper < 0.0
 
 
 def score(errors: PointErrors) -> float:
@@ -213,16 +214,22 @@ class Resampling:
         self, first: PointErrors, second: PointErrors, scores: tuple[np.ndarray, np.ndarray] | None = None
     ) -> Paired:
         """The difference of two models' scores; ``scores`` those of the resamples where they are known already."""
-        from scipy.special import stdtrit
+        from scipy.special import ndtri, stdtrit
 
+        difference = score(first) - score(second)
+        if math.isinf(difference):  # one of them gives no numbers
+            return Paired(difference, math.nan, difference, difference)
         resampled = scores or (self.scores(first), self.scores(second))
         with np.errstate(invalid="ignore"):
-            uncertainty = self.uncertainty(resampled[0] - resampled[1])
-            difference = score(first) - score(second)
-        quantile = float(stdtrit(self.units - 1, 0.5 + 0.5 * LEVEL)) if self.units > 1 else math.nan
-        # without an uncertainty nothing is told apart, except from what gives no numbers
-        margin = quantile * uncertainty if math.isfinite(uncertainty) else math.inf
-        return Paired(difference, uncertainty, 0.0 if math.isinf(difference) else margin)
+            spread = resampled[0] - resampled[1]
+        uncertainty = self.uncertainty(spread)
+        if not math.isfinite(uncertainty):
+            return Paired(difference, uncertainty, -math.inf, math.inf)
+        tail = 0.5 - 0.5 * LEVEL
+        stretch = float(stdtrit(self.units - 1, tail) / ndtri(tail))
+        low, high = np.quantile(spread[np.isfinite(spread)], [tail, 1.0 - tail])
+        ends = (difference + stretch * (end - difference) for end in (float(low), float(high)))
+        return Paired(difference, uncertainty, *ends)
 
 
 def _penalised(error: np.ndarray, measured: np.ndarray) -> np.ndarray:

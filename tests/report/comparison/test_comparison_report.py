@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import csv
+import html
 import json
 import math
+import re
 
 import numpy as np
 import pytest
@@ -146,9 +148,19 @@ def test_without_figures_no_plotting_library_is_needed(compared, tmp_path, monke
 
     monkeypatch.setattr(builtins, "__import__", guarded)
     written = write_comparison(compared, tmp_path / "plain", figure_format=None)
-    assert [p.name for p in written] == [
-        "summary.txt",
-        "comparison.csv",
-        "comparison.json",
-        "best-model.json",
-    ]
+    assert [p.suffix for p in written] == [".html", ".txt", ".csv", ".json", ".json"]
+    assert "No figures were drawn" in written[0].read_text(encoding="utf-8")
+
+
+def test_the_page_needs_nothing_but_itself_and_says_what_the_summary_says(compared, folder):
+    page = (folder / "index.html").read_text(encoding="utf-8")
+    assert "<script" not in page and not re.search(r'(src|href)="(https?:)?//', page)
+    text = " ".join(html.unescape(re.sub(r"<[^>]+>", " ", page)).split())
+    for contender in compared.comparison.ranking:
+        assert contender.name in text
+    assert " ".join(compared.comparison.sentences()[0].split()) in text
+    assert "silent: ValueError: no formula [yet]" in text
+    assert len(re.findall(r'<svg role="img" aria-label="[^"]+', page)) == 2
+    links = re.findall(r'<a href="([^"#]+)"', page)
+    assert {"comparison.csv", "curves.png"} <= set(links)
+    assert all((folder / link).is_file() for link in links)

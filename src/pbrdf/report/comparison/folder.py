@@ -7,21 +7,41 @@ import json
 import math
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pbrdf.files.atomic import atomic_folder
 from pbrdf.inversion.model_comparison import Comparison, Contender
+from pbrdf.report.comparison.page import page_text
 from pbrdf.report.comparison.subject import Compared
 from pbrdf.report.comparison.summary import summary_text
 from pbrdf.report.numbers import plain, shown_unit
 from pbrdf.version import __version__
 
-__all__ = ["comparison_record", "write_comparison"]
+if TYPE_CHECKING:
+    from markupsafe import Markup
+
+__all__ = ["FIGURE_FORMATS", "comparison_record", "write_comparison"]
+
+FIGURE_FORMATS = ("png", "pdf", "svg")
 
 _CSV_COLUMNS = (
     "rank", "model", "free", "score", "score_std", "behind_best", "behind_best_std", "told_apart",
     "intensity_median_error", "polarisation_rms_error", "aic", "bic", "seconds", "remarks",
 )  # fmt: skip
+
+
+#: What each figure shows, for those who do not see it, and how to read it.
+_CAPTIONS = {
+    "ranking": (
+        "Held-out error of every model with its uncertainty.",
+        "Bars: one standard uncertainty. Differences are known better than the errors themselves: all models predict "
+        "the same geometries.",
+    ),
+    "curves": (
+        "Curves of every model over what was measured in the plane of incidence.",
+        "Points: measured, open ones held out. The six models that predict best have a colour; the others are grey.",
+    ),
+}
 
 
 def write_comparison(report: Compared, directory: Path, *, figure_format: str | None = "png") -> list[Path]:
@@ -47,7 +67,8 @@ def write_comparison(report: Compared, directory: Path, *, figure_format: str | 
         If the folder cannot be written.
     """
     comparison = report.comparison
-    names = ["summary.txt", "comparison.csv", "comparison.json", "best-model.json"]
+    names = ["index.html", "summary.txt", "comparison.csv", "comparison.json", "best-model.json"]
+    pieces: dict[str, Markup] = {}
     with atomic_folder(directory, fill=True) as temporary:
         (temporary / "summary.txt").write_text(summary_text(report), encoding="utf-8")
         with (temporary / "comparison.csv").open("w", encoding="utf-8", newline="") as file:
@@ -59,11 +80,20 @@ def write_comparison(report: Compared, directory: Path, *, figure_format: str | 
         comparison.best.result.model.to_json(temporary / "best-model.json")
         if figure_format is not None:
             from pbrdf.report.comparison.figure import curves_figure, ranking_figure
+            from pbrdf.report.inline_svg import inline_svg
+            from pbrdf.report.page import figure
             from pbrdf.report.style import save_figure
 
-            for name, draw in (("curves", curves_figure), ("ranking", ranking_figure)):
-                save_figure(draw(report), temporary / f"{name}.{figure_format}")
-                names.append(f"{name}.{figure_format}")
+            for name, draw in (("ranking", ranking_figure), ("curves", curves_figure)):
+                made = draw(report)
+                drawn = f"{name}.{figure_format}"
+                save_figure(made, temporary / drawn)
+                names.append(drawn)
+                shown, caption = _CAPTIONS[name]
+                alternative = f"{shown} {comparison.sentences()[0]}"
+                pieces[name] = figure(inline_svg(made, alternative, name), caption, [drawn])
+        page = page_text(report, pieces, names[1:])
+        (temporary / "index.html").write_text(page, encoding="utf-8")
     return [directory / name for name in names]
 
 

@@ -27,12 +27,15 @@ class Compared:
         How the comparison was asked for, in plain values.
     command
         The command line, where there was one.
+    sha256
+        That of the file; empty where the data came from elsewhere.
     """
 
     comparison: Comparison
     name: str
     settings: Mapping[str, Any] = field(default_factory=dict)
     command: str = ""
+    sha256: str = ""
 
 
 def table(comparison: Comparison) -> tuple[list[str], list[list[str]]]:
