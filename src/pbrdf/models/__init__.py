@@ -12,7 +12,7 @@ from pbrdf.models.baselines import (
     Maignan2009,
     RPVHotSpot,
 )
-from pbrdf.models.coherent import MirrorFacetsMRPV
+from pbrdf.models.coherent import MetallicLacquer, MirrorFacetsMRPV
 from pbrdf.models.double_gauss import DoubleGauss, ReciprocalDoubleGauss
 from pbrdf.models.hyde import HydeType
 from pbrdf.models.microfacet import (
@@ -39,6 +39,7 @@ __all__ = [
     "HydeType",
     "Litvinov2011",
     "Maignan2009",
+    "MetallicLacquer",
     "MirrorFacetsMRPV",
     "Model",
     "Option",
@@ -60,6 +61,7 @@ register(GGXLambert)
 register(GeneralisedGaussianMRPV)
 register(DoubleGaussTwoLobes)
 register(MirrorFacetsMRPV)
+register(MetallicLacquer)
 register(Baek2018)
 register(GermerSubsurface)
 register(RPVHotSpot)

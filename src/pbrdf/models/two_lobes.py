@@ -1,57 +1,25 @@
 """The double-Gauss with a second lobe of facets: metallic flakes below the coat, or a second roughness of it.
 
 Source of the first lobe and of the body: :mod:`pbrdf.models.double_gauss`. The second lobe is the same formula, paper
-eq. (2), with parameters of its own. Nothing is refracted: the tilt of flakes below a coat is the one that they seem
-to have from outside, and what the coat takes from their light is in the strength.
+eq. (2), with parameters of its own, see :mod:`pbrdf.models.parts.flakes`.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any, ClassVar
 
 from pbrdf.models.arrays import Matrix
 from pbrdf.models.double_gauss import DoubleGauss
 from pbrdf.models.parameters import Option, Parameter
-from pbrdf.models.parts.facets import Facets, GaussianSlopes
-from pbrdf.models.parts.part import Renamed, added
+from pbrdf.models.parts.facets import GaussianSlopes
+from pbrdf.models.parts.flakes import Flakes
+from pbrdf.models.parts.part import added
 from pbrdf.optics.geometry import Geometry
 
 __all__ = ["DoubleGaussTwoLobes"]
 
-_NAMES = {
-    "sigma": ("flake_sigma", "σ₂"),
-    "n": ("flake_n", "n₂"),
-    "kappa": ("flake_kappa", "κ₂"),
-    "strength": ("flake_strength", "ζ₂"),
-}
-_SECOND = Renamed(Facets(GaussianSlopes(), ("v-cavity",), strength=True), _NAMES)
-#: What is said otherwise of the second lobe: it is broad, its strength is fitted, its index is aluminium's at 550 nm.
-_SAID: dict[str, dict[str, Any]] = {
-    "flake_sigma": {
-        "description": "standard deviation of one slope component of the second lobe's facets",
-        "lower": 0.02,
-        "default": 0.2,
-    },
-    "flake_n": {
-        "description": "real refractive index of the flakes",
-        "lower": 0.1,
-        "upper": 4.0,
-        "default": 0.96,
-        "fitted": False,
-    },
-    "flake_kappa": {"description": "extinction of the flakes", "upper": 12.0, "default": 6.7},
-    "flake_strength": {
-        "description": "factor on the second lobe's reflection: share of the surface that flakes cover",
-        "lower": 1e-4,
-        "upper": 20.0,
-        "domain": (0.0, math.inf),
-        "default": 0.1,
-        "fitted": True,
-    },
-}
+_SECOND = Flakes(GaussianSlopes())
 
 
 class DoubleGaussTwoLobes(DoubleGauss):
@@ -64,7 +32,7 @@ class DoubleGaussTwoLobes(DoubleGauss):
     name: ClassVar[str] = "double-gauss-two-lobes"
     parameters: ClassVar[tuple[Parameter, ...]] = (
         *DoubleGauss.parameters,
-        *(replace(p, **_SAID[p.name]) for p in _SECOND.parameters),
+        *_SECOND.parameters,
     )
     options: ClassVar[Mapping[str, Option]] = {
         **DoubleGauss.options,

@@ -1,0 +1,71 @@
+"""A second lobe of facets: flakes below a clear coat, with a density, a strength and an index of their own.
+
+The formula is the facets' (:mod:`pbrdf.models.parts.facets`). Nothing is refracted: the tilt of flakes below a coat
+is the one that they seem to have from outside, and what the coat takes from their light is in the strength.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+from pbrdf.models.parts.facets import Density, Facets
+from pbrdf.models.parts.part import Renamed
+
+__all__ = ["Flakes"]
+
+_NAMES = {
+    "sigma": ("flake_sigma", "σ₂"),
+    "roughness": ("flake_roughness", "α₂"),
+    "exponent": ("flake_exponent", "β₂"),
+    "n": ("flake_n", "n₂"),
+    "kappa": ("flake_kappa", "κ₂"),
+    "strength": ("flake_strength", "ζ₂"),
+}
+#: What is said otherwise of the second lobe: it is broad, its strength is fitted, its index is aluminium's at 550 nm.
+_SAID: dict[str, dict[str, Any]] = {
+    "flake_sigma": {
+        "description": "standard deviation of one slope component of the second lobe's facets",
+        "lower": 0.02,
+        "default": 0.2,
+    },
+    "flake_roughness": {
+        "description": "slope at which the density of the second lobe's facets has fallen to 1/e",
+        "lower": 0.01,
+        "default": 0.2,
+    },
+    "flake_exponent": {"description": "exponent of the density of the second lobe's slopes"},
+    "flake_n": {
+        "description": "real refractive index of the flakes",
+        "lower": 0.1,
+        "upper": 4.0,
+        "default": 0.96,
+        "fitted": False,
+    },
+    "flake_kappa": {"description": "extinction of the flakes", "upper": 12.0, "default": 6.7},
+    "flake_strength": {
+        "description": "factor on the second lobe's reflection: share of the surface that flakes cover",
+        "lower": 1e-4,
+        "upper": 20.0,
+        "domain": (0.0, math.inf),
+        "default": 0.1,
+        "fitted": True,
+    },
+}
+
+
+class Flakes(Renamed):
+    """Facets of a density under the names ``flake_…``, under a V-cavity. Reciprocal; conserves energy for ζ₂ ≤ 1.
+
+    Parameters
+    ----------
+    density
+        Of the facets' projected area.
+    """
+
+    def __init__(self, density: Density) -> None:
+        facets = Facets(density, ("v-cavity",), strength=True)
+        own = {p.name for p in facets.parameters}
+        super().__init__(facets, {old: new for old, new in _NAMES.items() if old in own})
+        self.parameters = tuple(replace(p, **_SAID[p.name]) for p in self.parameters)
