@@ -87,6 +87,12 @@ def test_the_worst_geometry_is_the_one_with_the_largest_residual(whole):
     assert worst in first[:7]
 
 
+def test_signs_of_the_residuals_are_part_of_where_it_fails(whole):
+    said = section(page_text(whole, {}, []), "Where it fails")
+    analysis = whole.result.error_analysis().sentences()
+    assert analysis[0] in said and analysis[-1] in said
+
+
 def test_it_can_be_repeated(whole):
     said = section(page_text(whole, {}, ["fit.json"]), "How to repeat it")
     assert whole.command in said and whole.sha256 in said

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import platform
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -27,6 +27,7 @@ from pbrdf.report.page import (
     ShownVerdict,
     bullets,
     command,
+    markup,
     paragraph,
     render_page,
     subheading,
@@ -228,19 +229,17 @@ def _fails(report: Report) -> Iterator[Markup]:
     result = report.result
     yield _error_table("Errors, model − measured, of what was fitted.", result.fitted)
     analysis = report.checks.errors if report.checks is not None else error_analysis(result)
-    yield paragraph(analysis.sentences()[0])
+    # those on single groups stand in the table
+    yield bullets(s for s in analysis.sentences() if not s.startswith("Group "))
     polarised = analysis.dolp.count > 0
     if len(analysis.groups) > 1:
         headings = ["group", "intensity: mean", "standard deviation", "largest", "at"]
         headings += ["DoLP: mean", "largest", "at"] if polarised else []
         rows, classes = [], []
         for g in analysis.groups:
-            cells = [
-                g.group + (" (held out)" if g.held_out else ""),
-                *_statistics(g.relative, per_cent, True),
-            ]
+            cells = [g.group + (" (held out)" if g.held_out else ""), *_statistics(g.relative, per_cent)]
             if polarised:
-                mean, _, largest, where = _statistics(g.dolp, lambda v: brief(v, 2), False)
+                mean, _, largest, where = _statistics(g.dolp, lambda v: brief(v, 2))
                 cells += [mean, largest, where]
             rows.append(cells)
             classes.append("held" if g.held_out else "")
@@ -255,8 +254,8 @@ def _fails(report: Report) -> Iterator[Markup]:
     yield _worst_table(report)
 
 
-def _statistics(s: ErrorStatistics, text: object, relative: bool) -> list[str]:
-    assert callable(text)
+def _statistics(s: ErrorStatistics, text: Callable[[float], str]) -> list[str]:
+    """Mean, standard deviation and largest error, and where that is."""
     values = [text(v).replace("-", "−") for v in (s.mean, s.std, s.largest)]
     return [*values, "" if s.worst is None else s.worst.where]
 
@@ -344,7 +343,5 @@ def _text(value: object) -> str:
 
 
 def _file_list(files: Iterable[str]) -> Markup:
-    from pbrdf.report.page import markup
-
     links = markup(" · ").join(markup('<a href="{}">{}</a>', name, name) for name in files)
     return markup("<p>Files beside this page: {}</p>", links)
