@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -43,6 +43,8 @@ _FEWEST_ANGLES, _MOST_ANGLES = 3, 20
 _MOST_FOLDS = 8
 #: Wavelengths whose amplitudes are fitted apart; more are fitted one after the other.
 _MOST_WAVELENGTHS = 8
+#: Starts of a model that is fitted again with something added.
+_VARIED_STARTS = 6
 _GRAZING = math.radians(60.0)
 
 
@@ -315,7 +317,8 @@ def compare_models(
         How to divide them, as of :func:`~pbrdf.inversion.crossvalidation.cross_validate`. None takes the angles of
         incidence where there are 3 to 20, else groups, else blocks of viewing angles; 8 folds at most.
     vary
-        How many of the best models are fitted again with a finite source, with a robust loss and with both.
+        How many of the best models, each in its best reading, are fitted again with a finite source, with a robust loss
+        and with both.
     starts
         Starts of each fit, and of each fold.
     seed
@@ -352,15 +355,17 @@ def compare_models(
     plan = _Plan.of(dataset, hold_out, by, folds, seed, starts, max_iterations, arguments, splits)
     fitted: list[_Fitted] = []
     failures: list[Failure] = []
-    total = len(first.rungs) + vary * len(variations(first.rungs[0]).rungs)
+    varied = min(vary, len({rung.cls for rung in first.rungs}))
+    total = len(first.rungs) + varied * len(variations(first.rungs[0]).rungs)
     _run(plan, first.rungs, fitted, failures, total, progress)
     if not fitted:
         reasons = "; ".join(dict.fromkeys(f.reason for f in failures))
         raise FitError(f"no model could be fitted: {reasons}")
     steps = list(first.steps)
-    for best in sorted(fitted, key=lambda f: score(f.errors))[:vary]:
-        more: Ladder = variations(best.rung)
-        _run(plan, more.rungs, fitted, failures, total, progress)
+    for best in _best_of_each(fitted)[:vary]:
+        # from where the plain fit ended: few other starts are needed
+        more: Ladder = variations(replace(best.rung, model=best.result.model, options={}))
+        _run(replace(plan, starts=min(starts, _VARIED_STARTS)), more.rungs, fitted, failures, total, progress)
         steps += more.steps
     if progress is not None:
         progress("done", total, total)
@@ -478,6 +483,14 @@ def _run(
             continue
         errors = PointErrors.of(comparison, result.data.channels, plan.held_out)
         fitted.append(_Fitted(rung, result, comparison, errors, bad, time.perf_counter() - clock))
+
+
+def _best_of_each(fitted: Sequence[_Fitted]) -> list[_Fitted]:
+    """The best rung of each model, the best model first: readings and ablations of one are much alike."""
+    best: dict[type[Model], _Fitted] = {}
+    for one in sorted(fitted, key=lambda f: score(f.errors)):
+        best.setdefault(one.rung.cls, one)
+    return list(best.values())
 
 
 def _reason(error: BaseException) -> str:
