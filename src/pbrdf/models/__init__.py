@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pbrdf.models.base import Model
-from pbrdf.models.coherent import MetallicLacquer, MirrorFacetsMRPV
+from pbrdf.models.coherent import InterferenceLacquer, MetallicLacquer, MirrorFacetsMRPV
 from pbrdf.models.double_gauss import DoubleGauss, ReciprocalDoubleGauss
 from pbrdf.models.hyde import HydeType
 from pbrdf.models.microfacet import (
@@ -24,6 +24,7 @@ __all__ = [
     "GGXLambert",
     "GeneralisedGaussianMRPV",
     "HydeType",
+    "InterferenceLacquer",
     "MetallicLacquer",
     "MirrorFacetsMRPV",
     "Model",
@@ -46,3 +47,4 @@ register(GeneralisedGaussianMRPV)
 register(DoubleGaussTwoLobes)
 register(MirrorFacetsMRPV)
 register(MetallicLacquer)
+register(InterferenceLacquer)

@@ -13,12 +13,12 @@ import drjit as dr
 
 from pbrdf.models.composed import ComposedModel
 from pbrdf.models.parts.facets import Facets, GaussianSlopes, GeneralisedGaussian
-from pbrdf.models.parts.flakes import Flakes
+from pbrdf.models.parts.flakes import Flakes, InterferenceFlakes
 from pbrdf.models.parts.mirror import HEIGHT, CoherentMirror, coherent_share
 from pbrdf.models.parts.simple_bodies import MRPV
 from pbrdf.optics.geometry import Geometry
 
-__all__ = ["IncoherentFacets", "MetallicLacquer", "MirrorFacetsMRPV"]
+__all__ = ["IncoherentFacets", "InterferenceLacquer", "MetallicLacquer", "MirrorFacetsMRPV"]
 
 
 class IncoherentFacets(Facets):
@@ -60,3 +60,15 @@ class MetallicLacquer(ComposedModel):
 
     name: ClassVar[str] = "metallic-lacquer"
     parts = (CoherentMirror(), Flakes(GeneralisedGaussian()), MRPV())
+
+
+class InterferenceLacquer(ComposedModel):
+    """Mirror image of a finite source in a clear coat and flakes with a thin film below, which hide any body.
+
+    For lacquers whose colour changes with the angle, of opaque flakes over a dark ground. Own construction from the
+    named parts; the indices of flakes and film are held. Reciprocal. Energy: each lobe conserves it for ζ₂ ≤ 1; their
+    sum is not bound.
+    """
+
+    name: ClassVar[str] = "interference-lacquer"
+    parts = (CoherentMirror(), InterferenceFlakes(GeneralisedGaussian()))
