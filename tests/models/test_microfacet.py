@@ -18,6 +18,7 @@ from pbrdf.models import (
     InterferenceLacquer,
     MetallicLacquer,
     MirrorFacetsMRPV,
+    MirrorHazeMRPV,
     PriestGermer,
 )
 from pbrdf.models.reflectance import directional_hemispherical_reflectance
@@ -155,6 +156,14 @@ def test_a_lacquer_is_the_sum_of_its_lobes():
     np.testing.assert_allclose(model.mueller(*ANGLES, part="diffuse"), body, rtol=1e-12)
 
 
+def test_a_haze_has_the_coats_index():
+    """Mirror and haze of Gaussian slopes (exponent 2), both with Fresnel's reflection at n = 1.5."""
+    model = MirrorHazeMRPV(0.05, 0.0, 1.5, math.sqrt(2.0) * 0.2, 2.0, 0.3, 0.4, 1.2, 0.5)
+    expected = ref.specular(*ANGLES, 0.05, 1.5, "none") + 0.3 * ref.specular(*ANGLES, 0.2, 1.5)
+    found = model.mueller(*ANGLES, part="specular")
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9 * found.max())
+
+
 def test_a_film_changes_the_flakes_with_the_local_angle_alone():
     """Without contrast it does nothing; with it, (1 + V cos 2πm cosβ_f)/(1 + V) at β = 0 … 85° by Snell's law."""
     values = {
@@ -181,6 +190,7 @@ def test_a_film_changes_the_flakes_with_the_local_angle_alone():
         GGXLambert(0.2, 1.5, 0.4, kappa=0.3),
         GeneralisedGaussianMRPV(0.2, 1.2, 1.5, 0.4, 0.8, 0.6, kappa=0.3),
         MirrorFacetsMRPV(0.1, 0.05, 1.5, 0.2, 0.4, 0.8, 0.6),
+        MirrorHazeMRPV(0.1, 0.05, 1.5, 0.2, 1.2, 0.3, 0.4, 0.8, 0.6),
         MetallicLacquer(0.1, 0.05, 1.5, 0.2, 1.2, 0.3, 0.4, 0.8, 0.6),
         InterferenceLacquer(0.1, 0.05, 1.5, 0.2, 1.2, 0.3, 1.7, 0.8),
         DoubleGaussTwoLobes(0.1, 1.5, 0.4, 1.2, 0.1, 0.0, flake_sigma=0.2, flake_strength=0.3),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pbrdf.models.base import Model
-from pbrdf.models.coherent import InterferenceLacquer, MetallicLacquer, MirrorFacetsMRPV
+from pbrdf.models.coherent import InterferenceLacquer, MetallicLacquer, MirrorFacetsMRPV, MirrorHazeMRPV
 from pbrdf.models.double_gauss import DoubleGauss, ReciprocalDoubleGauss
 from pbrdf.models.hyde import HydeType
 from pbrdf.models.microfacet import (
@@ -27,6 +27,7 @@ __all__ = [
     "InterferenceLacquer",
     "MetallicLacquer",
     "MirrorFacetsMRPV",
+    "MirrorHazeMRPV",
     "Model",
     "Option",
     "Parameter",
@@ -46,5 +47,6 @@ register(GGXLambert)
 register(GeneralisedGaussianMRPV)
 register(DoubleGaussTwoLobes)
 register(MirrorFacetsMRPV)
+register(MirrorHazeMRPV)
 register(MetallicLacquer)
 register(InterferenceLacquer)

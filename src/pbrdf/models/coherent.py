@@ -14,11 +14,12 @@ import drjit as dr
 from pbrdf.models.composed import ComposedModel
 from pbrdf.models.parts.facets import Facets, GaussianSlopes, GeneralisedGaussian
 from pbrdf.models.parts.flakes import Flakes, InterferenceFlakes
+from pbrdf.models.parts.haze import Haze
 from pbrdf.models.parts.mirror import HEIGHT, CoherentMirror, coherent_share
 from pbrdf.models.parts.simple_bodies import MRPV
 from pbrdf.optics.geometry import Geometry
 
-__all__ = ["IncoherentFacets", "InterferenceLacquer", "MetallicLacquer", "MirrorFacetsMRPV"]
+__all__ = ["IncoherentFacets", "InterferenceLacquer", "MetallicLacquer", "MirrorFacetsMRPV", "MirrorHazeMRPV"]
 
 
 class IncoherentFacets(Facets):
@@ -49,6 +50,18 @@ class MirrorFacetsMRPV(ComposedModel):
 
     name: ClassVar[str] = "mirror-facets"
     parts = (CoherentMirror(), IncoherentFacets(), MRPV())
+
+
+class MirrorHazeMRPV(ComposedModel):
+    """Mirror image of a finite source, a haze of generalised Gaussian facets of the same coat, and an MRPV body.
+
+    For glossy coats with a halo. Own construction from the named parts: unlike ``mirror-facets``, how much light the
+    haze takes is fitted, not derived. Reciprocal. Energy: each lobe conserves it for ζ₂ ≤ 1; their sum and the body's
+    amplitude a are not bound.
+    """
+
+    name: ClassVar[str] = "mirror-haze"
+    parts = (CoherentMirror(), Haze(GeneralisedGaussian()), MRPV())
 
 
 class MetallicLacquer(ComposedModel):
