@@ -27,7 +27,8 @@ def test_only_the_noise_is_left(name):
     rng = np.random.default_rng(1)
     noisy = {c: stokes[:, j] + noise * rng.normal(size=120) for j, c in enumerate("IQU")}
     data = pbrdf.make_dataset(*angles, quantity="brdf", **noisy, std=dict.fromkeys("IQU", noise))
-    result = pbrdf.fit(data, cls, starts=6)
+    # lobes beside each other have local minima
+    result = pbrdf.fit(data, cls, starts=64)
     assert result.goodness.reduced_chi2 == pytest.approx(1.0, abs=0.25)
     clean = result.model.stokes(*angles)
     assert np.abs((clean - stokes)[:, :3] / noise[:, None]).max() < 3.0

@@ -15,7 +15,10 @@ from pbrdf.models import (
     GeneralisedGaussianMRPV,
     GGXLambert,
     HydeType,
+    InterferenceLacquer,
+    MetallicLacquer,
     MirrorFacetsMRPV,
+    MirrorHazeMRPV,
     PriestGermer,
 )
 from pbrdf.models.reflectance import directional_hemispherical_reflectance
@@ -140,6 +143,41 @@ def test_a_rough_coat_has_no_mirror_and_a_smooth_one_nothing_else():
     assert found == pytest.approx(expected, rel=0.04)
 
 
+def test_a_lacquer_is_the_sum_of_its_lobes():
+    """Mirror of an unrough surface, metal facets (generalised Gaussian of exponent 2: Gaussian), MRPV body."""
+    model = MetallicLacquer(
+        0.05, 0.0, 1.5, math.sqrt(2.0) * 0.2, 2.0, 0.3, 0.4, 1.2, 0.5, flake_n=1.1, flake_kappa=5
+    )
+    mirror = ref.specular(*ANGLES, 0.05, 1.5, "none")
+    flakes = 0.3 * ref.specular(*ANGLES, 0.2, 1.1 - 5.0j)
+    found = model.mueller(*ANGLES, part="specular")
+    np.testing.assert_allclose(found, mirror + flakes, rtol=0, atol=1e-9 * found.max())
+    body = DoubleGauss(0.05, 1.5, 0.4, 1.2, 0.5, 0.0).mueller(*ANGLES, part="diffuse")
+    np.testing.assert_allclose(model.mueller(*ANGLES, part="diffuse"), body, rtol=1e-12)
+
+
+def test_a_haze_has_the_coats_index():
+    """Mirror and haze of Gaussian slopes (exponent 2), both with Fresnel's reflection at n = 1.5."""
+    model = MirrorHazeMRPV(0.05, 0.0, 1.5, math.sqrt(2.0) * 0.2, 2.0, 0.3, 0.4, 1.2, 0.5)
+    expected = ref.specular(*ANGLES, 0.05, 1.5, "none") + 0.3 * ref.specular(*ANGLES, 0.2, 1.5)
+    found = model.mueller(*ANGLES, part="specular")
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9 * found.max())
+
+
+def test_a_film_changes_the_flakes_with_the_local_angle_alone():
+    """Without contrast it does nothing; with it, (1 + V cos 2πm cosβ_f)/(1 + V) at β = 0 … 85° by Snell's law."""
+    values = {
+        "mirror_width": 0.05, "mirror_height": 10.0, "n": 1.5, "flake_roughness": 0.3, "flake_exponent": 2.0,
+        "flake_strength": 0.3, "film_order": 1.7,
+    }  # fmt: skip
+    beta, *_ = ref.explicit_angles(*ANGLES)
+    plain, film = (InterferenceLacquer(**values, film_visibility=v).mueller(*ANGLES) for v in (0.0, 0.8))
+    inside = np.arcsin(np.sin(beta) / 1.38)
+    expected = (1.0 + 0.8 * np.cos(2.0 * np.pi * 1.7 * np.cos(inside))) / 1.8
+    np.testing.assert_allclose(film[:, 0, 0], plain[:, 0, 0] * expected, rtol=1e-7, atol=1e-12)
+    assert expected.min() < 0.2 and expected.max() > 0.7
+
+
 # --- reciprocity and energy, as the docstrings say ---
 
 
@@ -152,6 +190,9 @@ def test_a_rough_coat_has_no_mirror_and_a_smooth_one_nothing_else():
         GGXLambert(0.2, 1.5, 0.4, kappa=0.3),
         GeneralisedGaussianMRPV(0.2, 1.2, 1.5, 0.4, 0.8, 0.6, kappa=0.3),
         MirrorFacetsMRPV(0.1, 0.05, 1.5, 0.2, 0.4, 0.8, 0.6),
+        MirrorHazeMRPV(0.1, 0.05, 1.5, 0.2, 1.2, 0.3, 0.4, 0.8, 0.6),
+        MetallicLacquer(0.1, 0.05, 1.5, 0.2, 1.2, 0.3, 0.4, 0.8, 0.6),
+        InterferenceLacquer(0.1, 0.05, 1.5, 0.2, 1.2, 0.3, 1.7, 0.8),
         DoubleGaussTwoLobes(0.1, 1.5, 0.4, 1.2, 0.1, 0.0, flake_sigma=0.2, flake_strength=0.3),
     ],
     ids=lambda m: m.name,

@@ -12,7 +12,7 @@ from pbrdf.models.baselines import (
     Maignan2009,
     RPVHotSpot,
 )
-from pbrdf.models.coherent import MetallicLacquer, MirrorFacetsMRPV
+from pbrdf.models.coherent import InterferenceLacquer, MetallicLacquer, MirrorFacetsMRPV, MirrorHazeMRPV
 from pbrdf.models.double_gauss import DoubleGauss, ReciprocalDoubleGauss
 from pbrdf.models.hyde import HydeType
 from pbrdf.models.microfacet import (
@@ -37,10 +37,12 @@ __all__ = [
     "GeneralisedGaussianMRPV",
     "GermerSubsurface",
     "HydeType",
+    "InterferenceLacquer",
     "Litvinov2011",
     "Maignan2009",
     "MetallicLacquer",
     "MirrorFacetsMRPV",
+    "MirrorHazeMRPV",
     "Model",
     "Option",
     "Parameter",
@@ -61,6 +63,7 @@ register(GGXLambert)
 register(GeneralisedGaussianMRPV)
 register(DoubleGaussTwoLobes)
 register(MirrorFacetsMRPV)
+register(MirrorHazeMRPV)
 register(MetallicLacquer)
 register(Baek2018)
 register(GermerSubsurface)
@@ -69,3 +72,4 @@ register(Diner2012)
 register(Diner2012Uniform)
 register(Maignan2009)
 register(Litvinov2011)
+register(InterferenceLacquer)

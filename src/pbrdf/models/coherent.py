@@ -13,12 +13,13 @@ import drjit as dr
 
 from pbrdf.models.composed import ComposedModel
 from pbrdf.models.parts.facets import Facets, GaussianSlopes, GeneralisedGaussian
-from pbrdf.models.parts.flakes import Flakes
+from pbrdf.models.parts.flakes import Flakes, InterferenceFlakes
+from pbrdf.models.parts.haze import Haze
 from pbrdf.models.parts.mirror import HEIGHT, CoherentMirror, coherent_share
 from pbrdf.models.parts.simple_bodies import MRPV
 from pbrdf.optics.geometry import Geometry
 
-__all__ = ["IncoherentFacets", "MetallicLacquer", "MirrorFacetsMRPV"]
+__all__ = ["IncoherentFacets", "InterferenceLacquer", "MetallicLacquer", "MirrorFacetsMRPV", "MirrorHazeMRPV"]
 
 
 class IncoherentFacets(Facets):
@@ -51,6 +52,18 @@ class MirrorFacetsMRPV(ComposedModel):
     parts = (CoherentMirror(), IncoherentFacets(), MRPV())
 
 
+class MirrorHazeMRPV(ComposedModel):
+    """Mirror image of a finite source, a haze of generalised Gaussian facets of the same coat, and an MRPV body.
+
+    For glossy coats with a halo. Own construction from the named parts: unlike ``mirror-facets``, how much light the
+    haze takes is fitted, not derived. Reciprocal. Energy: each lobe conserves it for ζ₂ ≤ 1; their sum and the body's
+    amplitude a are not bound.
+    """
+
+    name: ClassVar[str] = "mirror-haze"
+    parts = (CoherentMirror(), Haze(GeneralisedGaussian()), MRPV())
+
+
 class MetallicLacquer(ComposedModel):
     """Mirror image of a finite source in a clear coat, flakes of a generalised Gaussian density below, an MRPV body.
 
@@ -60,3 +73,15 @@ class MetallicLacquer(ComposedModel):
 
     name: ClassVar[str] = "metallic-lacquer"
     parts = (CoherentMirror(), Flakes(GeneralisedGaussian()), MRPV())
+
+
+class InterferenceLacquer(ComposedModel):
+    """Mirror image of a finite source in a clear coat and flakes with a thin film below, which hide any body.
+
+    For lacquers whose colour changes with the angle, of opaque flakes over a dark ground. Own construction from the
+    named parts; the indices of flakes and film are held. Reciprocal. Energy: each lobe conserves it for ζ₂ ≤ 1; their
+    sum is not bound.
+    """
+
+    name: ClassVar[str] = "interference-lacquer"
+    parts = (CoherentMirror(), InterferenceFlakes(GeneralisedGaussian()))

@@ -7,13 +7,18 @@ is the one that they seem to have from outside, and what the coat takes from the
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
+from pbrdf.models.arrays import Matrix, is_zero
+from pbrdf.models.parameters import Parameter
 from pbrdf.models.parts.facets import Density, Facets
 from pbrdf.models.parts.part import Renamed
+from pbrdf.optics.geometry import Geometry
+from pbrdf.optics.interference import two_beam_interference
 
-__all__ = ["Flakes"]
+__all__ = ["Flakes", "InterferenceFlakes"]
 
 _NAMES = {
     "sigma": ("flake_sigma", "σ₂"),
@@ -69,3 +74,45 @@ class Flakes(Renamed):
         own = {p.name for p in facets.parameters}
         super().__init__(facets, {old: new for old, new in _NAMES.items() if old in own})
         self.parameters = tuple(replace(p, **_SAID[p.name]) for p in self.parameters)
+
+
+_FILM = (
+    Parameter(
+        "film_order", "m", "1", "order of the film's interference at normal incidence, 2 n_f d/λ",
+        0.3, 4.0, (0.0, 100.0), 1.5, part="specular",
+    ),
+    Parameter(
+        "film_visibility", "V", "1", "contrast of the film's interference",
+        0.0, 1.0, (0.0, 1.0), 0.5, part="specular",
+    ),
+    Parameter(
+        "film_n", "n_f", "1", "refractive index of the film on the flakes (magnesium fluoride's unless given)",
+        1.2, 2.6, (1.0, 10.0), 1.38, fitted=False, part="specular",
+    ),
+)  # fmt: skip
+
+
+class InterferenceFlakes(Flakes):
+    """Flakes with a thin film, whose reflection changes with the local angle of incidence.
+
+    Own construction: the flakes' matrix times the two beams' interference
+    (:func:`~pbrdf.optics.interference.two_beam_interference`), the same for both polarisations. Reciprocal; conserves
+    energy for ζ₂ ≤ 1.
+    """
+
+    def __init__(self, density: Density) -> None:
+        super().__init__(density)
+        self.parameters = (*self.parameters, *_FILM)
+
+    def matrix(self, geometry: Geometry, values: Mapping[str, Any], chosen: Mapping[str, str]) -> Matrix:
+        share = two_beam_interference(
+            geometry.cos_beta, values["film_order"], values["film_visibility"], values["film_n"]
+        )
+        f = super().matrix(geometry, values, chosen)
+        return [[x if is_zero(x) else x * share for x in row] for row in f]
+
+    def albedo(self, cos_theta: Any, values: Mapping[str, Any]) -> Any:
+        share = two_beam_interference(
+            cos_theta, values["film_order"], values["film_visibility"], values["film_n"]
+        )
+        return super().albedo(cos_theta, values) * share
