@@ -25,6 +25,8 @@ _FEWEST = 8
 _MOST_GROUPS = 4
 #: Part of the residuals that the colours span; the others have the colours of the ends.
 _SPAN = 0.95
+#: Per cent beyond which relative differences of dark points would leave no colour to the others.
+_WIDEST = 100.0
 
 
 def hemisphere_figure(report: Report) -> Figure | None:
@@ -66,6 +68,8 @@ def hemisphere_figure(report: Report) -> Figure | None:
                     residual = residual / channels[name].measured
             finite = np.abs(residual[np.isin(measured.group, shown) & np.isfinite(residual)])
             limit = float(np.quantile(finite, _SPAN)) if finite.size and finite.max() > 0.0 else 1.0
+            if name == "intensity":
+                limit = min(limit, _WIDEST)
             for ax, group in zip(row, shown, strict=True):
                 chosen = (measured.group == group) & np.isfinite(residual)
                 # the largest residuals on top
