@@ -45,6 +45,8 @@ _MOST_FOLDS = 8
 _MOST_WAVELENGTHS = 8
 #: Starts of a model that is fitted again with something added.
 _VARIED_STARTS = 6
+#: Uncertainty in per cent below which a difference is one of rounding.
+_EXACT = 1e-3
 _GRAZING = math.radians(60.0)
 
 
@@ -203,8 +205,7 @@ class Comparison:
         if len(leaders) == 1:
             second = self.ranking[1]
             return [
-                f"It is told apart from every other: the next, {second.name}, is "
-                f"{_error(second.behind.difference, second.behind.uncertainty)} behind."
+                f"It is told apart from every other: the next, {second.name}, is {_difference(second.behind)} behind."
             ]
         simplest = min(leaders, key=lambda c: (c.free, c.score))
         sentence = (
@@ -222,14 +223,13 @@ class Comparison:
                 continue
             paired = self.paired(step.simple, step.rich)
             simple, rich = self[step.simple].score, self[step.rich].score
-            change = f"{per_cent(simple)} with it, {per_cent(rich)} without"
-            difference = _error(abs(paired.difference), paired.uncertainty)
+            change = f"{_per_cent(simple)} with it, {_per_cent(rich)} without"
             if not paired.apart:
-                said = f"costs nothing that these data show ({change}; they differ by {difference})"
+                said = f"costs nothing that these data show ({change}; difference {_difference(paired)})"
             elif paired.difference > 0.0:
-                said = f"costs {difference} of held-out error ({change})"
+                said = f"costs {_difference(paired)} of held-out error ({change})"
             else:
-                said = f"even saves {difference} of held-out error ({change}): what is freed is misled"
+                said = f"saves held-out error ({change}; difference {_difference(paired)}): what it frees is misled"
             lines.append(f"The assumption {step.assumption} in {step.rich} {said}.")
         return lines
 
@@ -275,7 +275,7 @@ class Comparison:
         if not worst:
             return []
         said = [
-            f"{name} ({per_cent(size)}, the model too {_side(bias)})" for name, _, size, bias in worst[:4]
+            f"{name} ({_per_cent(size)}, the model too {_side(bias)})" for name, _, size, bias in worst[:4]
         ]
         return [f"Where {self.best.name} fails: {'; '.join(said)}."]
 
@@ -613,7 +613,7 @@ def _side(bias: float) -> str:
     return "bright" if bias > 0.0 else "dark"
 
 
-def per_cent(share: float) -> str:
+def _per_cent(share: float) -> str:
     """A share as per cent with two significant digits."""
     return f"{100.0 * share:.2g} %" if share < 0.0995 else f"{100.0 * share:.0f} %"
 
@@ -621,8 +621,17 @@ def per_cent(share: float) -> str:
 def _error(value: float, uncertainty: float) -> str:
     if not math.isfinite(value):
         return "∞"
-    if not (math.isfinite(uncertainty) and 100.0 * uncertainty > 1e-3):
-        return per_cent(value)
+    if not (math.isfinite(uncertainty) and 100.0 * uncertainty > _EXACT):
+        return _per_cent(value)
     digits = max(0, 1 - math.floor(math.log10(100.0 * uncertainty)))
     digits = min(digits, 4)
     return f"({100.0 * value:.{digits}f} ± {100.0 * uncertainty:.{digits}f}) %"
+
+
+def _difference(paired: Paired) -> str:
+    """A difference with its standard uncertainty and its interval."""
+    text = _error(paired.difference, paired.uncertainty)
+    if not (math.isfinite(paired.lower) and 100.0 * paired.uncertainty > _EXACT):
+        return text
+    ends = " … ".join(f"{float(f'{100.0 * end:.2g}'):g}" for end in (paired.lower, paired.upper))
+    return f"{text} [95 %: {ends}]".replace("-", "−")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import html
+import io
 import json
 import math
 import re
@@ -18,7 +19,7 @@ from pbrdf.models import DoubleGauss
 from pbrdf.report.comparison.figure import curves_figure, ranking_figure
 from pbrdf.report.comparison.folder import comparison_record, write_comparison
 from pbrdf.report.comparison.subject import Compared, share, table
-from pbrdf.report.comparison.summary import summary_text
+from pbrdf.report.comparison.summary import print_summary, summary_text
 
 
 @pytest.fixture(scope="module")
@@ -56,6 +57,16 @@ def test_the_summary_begins_with_the_verdict_and_ends_with_what_failed(compared)
     joined = " ".join(text.split())
     for sentence in compared.comparison.sentences():
         assert " ".join(sentence.split()) in joined
+
+
+def test_names_of_models_are_whole_in_a_narrow_table(compared):
+    from rich.console import Console
+
+    file = io.StringIO()
+    print_summary(compared, Console(file=file, width=90, color_system=None))
+    ranking = file.getvalue().split("\n\n")[1]
+    for contender in compared.comparison.ranking:
+        assert all(word in ranking for word in contender.name.split())
 
 
 def test_the_files_hold_the_same_numbers(compared, folder):

@@ -40,9 +40,13 @@ def _parts(report: Compared) -> Iterator[RenderableType]:
     yield ""
     headings, rows = table(comparison)
     shown = bare_table()
+    # the name of a model breaks at its spaces, never within a word
+    words = max(len(word) for row in rows for word in row[0].split())
     for k, heading in enumerate(headings):
-        words = k in (0, len(headings) - 1)
-        shown.add_column(heading, justify="left" if words else "right", no_wrap=not words)
+        if k in (0, len(headings) - 1):
+            shown.add_column(heading, min_width=None if k else words)
+        else:
+            shown.add_column(heading, justify="right", no_wrap=True)
     for row in rows:
         shown.add_row(*map(_literal, row))
     yield shown
