@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from pbrdf.report.inline_svg import inline_svg
-from pbrdf.report.style import new_figure, styled
+from pbrdf.report.style import BLUE, new_figure, styled
 
 
 @pytest.fixture(scope="module")
@@ -15,6 +15,7 @@ def svg():
         ax = figure.subplots()
         ax.plot([0.0, 1.0], [0.0, 1.0], color="black", marker="o", markerfacecolor="white")
         ax.plot([0.0, 1.0], [1.0, 0.0], color="#D55E00")
+        ax.plot([0.0, 1.0], [0.5, 0.5], color=BLUE)
         ax.set_title("θ < 1")
     return inline_svg(figure, 'rises & "falls"', "first")
 
@@ -33,10 +34,11 @@ def test_it_fetches_nothing_and_its_names_are_its_own(svg):
     assert set(re.findall(r'(?:url\(|href=")#([^")]+)', svg)) <= names
 
 
-def test_black_and_white_are_those_of_the_page_and_curves_keep_their_colour(svg):
+def test_black_and_white_are_those_of_the_page_and_curves_keep_theirs(svg):
     assert not re.search("(fill|stroke): #(000000|ffffff)", svg)
     assert "currentColor" in svg and "var(--paper)" in svg
     assert "#d55e00" in svg
+    assert "var(--curve-blue)" in svg and BLUE.lower() not in svg.lower()
 
 
 def test_very_many_points_become_a_picture():

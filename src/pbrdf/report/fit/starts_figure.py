@@ -41,6 +41,7 @@ def starts_figure(report: Report) -> Figure:
     title = f"{len(best)} starts of the fit to {short_name(report.name, report.dataset)}"
     with styled():
         from matplotlib.lines import Line2D
+        from matplotlib.ticker import FuncFormatter
 
         figure, axes = panels(
             math.ceil(len(free) / columns),
@@ -60,6 +61,9 @@ def starts_figure(report: Report) -> Figure:
             ax.set_title(textwrap.fill(f"{p.symbol}: {p.description}", 38), fontsize=8.5)
             if p.logarithmic:
                 ax.set_yscale("log")
+                # formulas as labels and ticks between the decades take longer than the lines
+                ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+                ax.minorticks_off()
             ax.set_ylim(estimate.lower, estimate.upper)
             ax.set_xticks([0, 1], ["start", "end"])
             ax.set_xlim(-0.12, 1.12)
