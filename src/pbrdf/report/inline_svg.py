@@ -66,9 +66,7 @@ def inline_svg(figure: Figure, alternative: str, name: str) -> Markup:
     body = re.sub(r"<metadata>.*?</metadata>", "", body, count=1, flags=re.DOTALL)
     body = re.sub(r"<style\b.*?</style>", "", body, flags=re.DOTALL)
     body = body.replace("xlink:href", "href")
-    body = re.sub(r'\bid="([^"]+)"', rf'id="{name}-\1"', body)
-    body = re.sub(r"url\(#", f"url(#{name}-", body)
-    body = body.replace('href="#', f'href="#{name}-')
+    body = re.sub(r'(\bid="|url\(#|href="#)', rf"\g<1>{name}-", body)
     body = _in_colours_of_the_page(body)
     width, height = (_PIXELS_PER_POINT * float(size) for size in view.groups())
     return Markup(
@@ -88,10 +86,7 @@ def _keep_small(ax: Any) -> None:
 
 
 def _in_colours_of_the_page(body: str) -> str:
-    for colour, page in (
-        ("#000000", "currentColor"),
-        ("#ffffff", "var(--paper)"),
-        ("#e4e4e4", "var(--grid)"),
-    ):
-        body = re.sub(rf"\b(fill|stroke): {colour}", rf"\1: {page}", body, flags=re.IGNORECASE)
+    body = re.sub(
+        r"\b(fill|stroke): (#[0-9a-f]{6})", lambda m: f"{m[1]}: {_PAGE_COLOURS.get(m[2], m[2])}", body
+    )
     return re.sub(r"font: ([\d.]+px) [^;\"]*", lambda m: f"font: {m[1]} {_FONTS}", body)
