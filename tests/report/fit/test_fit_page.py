@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import html
 import re
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import drjit
 import numpy as np
 import pytest
 
 import pbrdf
-from pbrdf.report.fit import page as module
+from pbrdf.inversion.verdict import Level
 from pbrdf.report.fit.checks import run_checks
 from pbrdf.report.fit.page import page_text
 from pbrdf.report.page import paragraph
@@ -118,16 +118,21 @@ def test_names_of_files_are_no_markup(whole):
     assert "<i>" not in text
 
 
-def test_the_verdict_stands_first(whole, monkeypatch):
-    @dataclass
-    class Verdict:
-        level: str = "does_not"
-        sentence: str = "Does not describe this sample."
-        reasons: tuple[str, ...] = ("it misses half",)
-
-    monkeypatch.setattr(module, "verdict_of", lambda _: Verdict())
+def test_the_verdict_stands_first_and_nothing_contradicts_it(whole, monkeypatch):
+    good = page_text(whole, {}, [])
+    verdict = whole.result.verdict()
+    assert 'class="verdict good"' in good and verdict.sentence in html.unescape(good)
+    assert good.index("verdict good") < good.index("What was measured</h2>")
+    assert "determined to" in section(good, "What was fitted")
+    bad = replace(verdict, level=Level.DOES_NOT, sentence="Does not describe this sample.")
+    monkeypatch.setattr(type(whole.result), "verdict", lambda _: bad)
     text = page_text(whole, {}, [])
     assert 'class="verdict bad"' in text
-    assert (
-        text.index("Does not describe") < text.index("it misses half") < text.index("What was measured</h2>")
-    )
+    said = section(text, "What was fitted")
+    assert "determined to" not in said and "do not quote" in said
+
+
+def test_what_to_try_next_is_told_where_there_is_something(whole, monkeypatch):
+    assert "What to try next" not in page_text(whole, {}, [])
+    monkeypatch.setattr(type(whole.checks), "advice", lambda _: ["try --loss cauchy"])
+    assert "try --loss cauchy" in section(page_text(whole, {}, []), "What to try next")

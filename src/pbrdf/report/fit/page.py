@@ -13,6 +13,7 @@ import numpy as np
 
 from pbrdf.inversion.erroranalysis import ErrorStatistics, error_analysis
 from pbrdf.inversion.holdout import Prediction
+from pbrdf.inversion.verdict import Level, Verdict
 from pbrdf.report.dataset.describe import cautions, describe
 from pbrdf.report.fit.subject import Report
 from pbrdf.report.fit.summary import (
@@ -24,7 +25,6 @@ from pbrdf.report.fit.summary import (
 from pbrdf.report.numbers import brief, per_cent, shown_unit, with_error
 from pbrdf.report.page import (
     Section,
-    ShownVerdict,
     bullets,
     command,
     markup,
@@ -39,7 +39,7 @@ from pbrdf.version import __version__
 if TYPE_CHECKING:
     from markupsafe import Markup
 
-__all__ = ["page_text", "verdict_of"]
+__all__ = ["page_text"]
 
 #: Where each figure of :mod:`pbrdf.report.fit.pictures` stands.
 _PLACES = {
@@ -70,29 +70,25 @@ def page_text(report: Report, figures: Mapping[str, Markup], files: Sequence[str
     def drawn(place: str) -> list[Markup]:
         return [figures[name] for name in _PLACES[place] if name in figures]
 
-    result = report.result
+    result, verdict = report.result, report.result.verdict()
+    advice = [] if report.checks is None else report.checks.advice()
     simulated = bool(report.dataset.attrs.get("simulated"))
     return render_page(
         f"{Path(report.name).name}: {result.model.name} fitted",
         [
             Section("What was measured", list(_measured(report))),
-            Section("What was fitted", [*_fitted(report), *drawn("fitted"), *_undrawn(figures)]),
+            Section("What was fitted", [*_fitted(report, verdict), *drawn("fitted"), *_undrawn(figures)]),
             Section("How sure it is", [*_sure(report), *drawn("sure")]),
             Section("How it predicts what it has not seen", list(_predicted(report))),
             Section("Where it fails", [*_fails(report), *drawn("fails")]),
+            *([Section("What to try next", [bullets(advice)])] if advice else []),
             Section("How to repeat it", list(_repeat(report, files))),
         ],
         banner="Simulated data, not measured." if simulated else "",
-        verdict=verdict_of(report),
+        verdict=verdict,
         footer=f"Written by pbrdf {__version__}. This page needs nothing but itself.",
         navigation=True,
     )
-
-
-def verdict_of(report: Report) -> ShownVerdict | None:
-    """What the fit is worth; None where nothing says so."""
-    judge = getattr(report.result, "verdict", None)
-    return None if judge is None else judge()
 
 
 def _undrawn(figures: Mapping[str, Markup]) -> list[Markup]:
@@ -106,7 +102,7 @@ def _measured(report: Report) -> Iterator[Markup]:
         yield bullets(warnings)
 
 
-def _fitted(report: Report) -> Iterator[Markup]:
+def _fitted(report: Report, verdict: Verdict) -> Iterator[Markup]:
     result = report.result
     options = [f"{name} = {choice}" for name, choice in result.model.chosen.items()]
     held = int(result.comparison["held_out"].values.sum())
@@ -120,11 +116,12 @@ def _fitted(report: Report) -> Iterator[Markup]:
         rows.append(("Steps", [f"{stage.name}: {stage.points} geometries" for stage in result.stages]))
     rows.append(("Goodness", goodness_in_words(result)))
     yield terms(rows)
-    yield _parameter_table(report)
+    yield _parameter_table(report, verdict)
 
 
-def _parameter_table(report: Report) -> Markup:
+def _parameter_table(report: Report, verdict: Verdict) -> Markup:
     rows, classes = [], []
+    described = verdict.level != Level.DOES_NOT
     for e in report.result.estimates.values():
         p = e.parameter
         factor, unit = shown_unit(p)
@@ -135,8 +132,9 @@ def _parameter_table(report: Report) -> Markup:
             "" if e.verdict == "fixed" else f"{brief(factor * e.lower, 3)} … {brief(factor * e.upper, 3)}"
         )
         label = p.name if p.symbol == p.name else f"{p.symbol} ({p.name})"
-        rows.append([label, p.description, value, unit, limits, verdict_in_words(e)])
-        classes.append({"determined": "", "fixed": "fixed"}.get(e.verdict, "doubtful"))
+        rows.append([label, p.description, value, unit, limits, verdict_in_words(e, described=described)])
+        sure = "" if described else "doubtful"
+        classes.append({"determined": sure, "fixed": "fixed"}.get(e.verdict, "doubtful"))
     return table(
         "Parameters. The error is one standard error.",
         ["parameter", "meaning", "value ± standard error", "unit", "bounds", "what the data say"],
