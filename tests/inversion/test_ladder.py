@@ -9,7 +9,7 @@ import pytest
 import pbrdf
 from own_model import LambertGGX
 from pbrdf.errors import ModelError
-from pbrdf.inversion.ladder import Rung, ladder, variations
+from pbrdf.inversion.ladder import Rung, ladder, with_robust_loss, with_source
 from pbrdf.models import MODELS, DoubleGauss, Model
 
 
@@ -70,14 +70,14 @@ def test_a_rung_is_taken_as_it_is_and_only_once():
 
 
 def test_variations():
-    found = variations(Rung("x", DoubleGauss))
-    assert [(r.name, r.nuisances, r.loss) for r in found.rungs] == [
-        ("x + source", ("source",), "linear"),
-        ("x + cauchy", (), "cauchy"),
-        ("x + source + cauchy", ("source",), "cauchy"),
-    ]
-    assert all(step.simple == "x" for step in found.steps)
-    assert variations(found.rungs[0]).rungs == ()
+    plain = Rung("x", DoubleGauss)
+    robust, step = with_robust_loss(plain)
+    assert (robust.name, robust.nuisances, robust.loss) == ("x + cauchy", (), "cauchy")
+    assert (step.simple, step.rich) == ("x", "x + cauchy")
+    wide, step = with_source(robust)
+    assert (wide.name, wide.nuisances, wide.loss) == ("x + cauchy + source", ("source",), "cauchy")
+    assert (step.simple, step.rich) == ("x + cauchy", "x + cauchy + source")
+    assert with_robust_loss(wide) is None and with_source(wide) is None
 
 
 def test_unknown_models_and_none():

@@ -66,10 +66,13 @@ def test_the_true_model_wins_and_what_holds_it_cannot_be_told_apart(polarised):
     assert found.best.name.startswith("double-gauss") and "unpolarised" not in found.best.name
     leaders = {c.name for c in found.leaders}
     assert "double-gauss" in leaders
-    assert {"double-gauss + source", "double-gauss + cauchy"} <= leaders or {
-        "double-gauss, visible + source",
-        "double-gauss, visible + cauchy",
-    } <= leaders
+    # of the readings the best is varied
+    varied = {c.name for c in found.ranking if c.rung.cls is DoubleGauss and " + " in c.name}
+    assert {name.split(" + ", 1)[1] for name in varied} in (
+        {"cauchy", "source"},
+        {"cauchy", "cauchy + source"},
+    )
+    assert varied <= leaders
     assert found["lambert-ggx"].behind.apart and found["lambert-ggx"].behind.difference > 0.03
     assert found.best.score < DESCRIBES
     sentences = found.sentences()
@@ -119,8 +122,9 @@ def test_information_criteria_are_those_of_the_fits_and_none_for_a_robust_loss(p
 def test_progress(polarised):
     found, seen = polarised
     rungs = len(found.ranking) + len(found.failures)
-    assert [done for _, done, _ in seen] == list(range(rungs + 1))
-    assert {total for *_, total in seen} == {rungs}
+    assert [done for _, done, _ in seen[:-1]] == list(range(rungs))
+    ((_, done, total),) = seen[-1:]
+    assert done == total >= rungs
     assert seen[-1][0] == "done"
 
 

@@ -58,7 +58,8 @@ def compare(
     vary: Annotated[
         int,
         typer.Option(
-            help="So many of the best are tried again with a finite source, a robust loss, and both.", min=0
+            help="So many of the best are tried again with a finite source, four times as many with a robust loss.",
+            min=0,
         ),
     ] = 2,
     starts: Annotated[int, typer.Option(help="Number of starts of each fit.", min=1)] = 16,

@@ -11,7 +11,7 @@ from pbrdf.errors import ModelError
 from pbrdf.models import MODELS, Model, find_model
 from pbrdf.models.parameters import Parameter
 
-__all__ = ["Ladder", "Rung", "Step", "ladder", "variations"]
+__all__ = ["Ladder", "Rung", "Step", "ladder", "with_robust_loss", "with_source"]
 
 #: Geometries at which two rungs that give the same matrices are one, radians: θ_i, θ_r, φ.
 _PROBES = np.deg2rad(
@@ -20,12 +20,6 @@ _PROBES = np.deg2rad(
 #: Places within the bounds at which they are compared.
 _PLACES = (0.3, 0.6)
 _SAME = 1e-9
-#: What a comparison adds to the best models, in this order: name, nuisance terms, loss, the assumption without it.
-_VARIATIONS: tuple[tuple[str, tuple[str, ...], str, str], ...] = (
-    ("source", ("source",), "linear", "a point source"),
-    ("cauchy", (), "cauchy", "no outliers (least squares)"),
-    ("source + cauchy", ("source",), "cauchy", "a point source and no outliers"),
-)
 
 
 @dataclass(frozen=True)
@@ -134,18 +128,20 @@ def ladder(models: Sequence[str | type[Model] | Model | Rung] | None = None) -> 
     return Ladder(tuple(sorted(rungs.values(), key=lambda rung: rung.free)), tuple(dict.fromkeys(steps)))
 
 
-def variations(rung: Rung) -> Ladder:
-    """The same model with a finite source, with a robust loss, and with both, as far as it has them not already."""
-    rungs, steps = [], []
-    for name, nuisances, loss, assumption in _VARIATIONS:
-        varied = replace(
-            rung, name=f"{rung.name} + {name}", nuisances=(*rung.nuisances, *nuisances), loss=loss
-        )
-        if rung.nuisances or rung.loss != "linear":
-            continue
-        rungs.append(varied)
-        steps.append(Step(assumption, rung.name, varied.name))
-    return Ladder(tuple(rungs), tuple(steps))
+def with_robust_loss(rung: Rung) -> tuple[Rung, Step] | None:
+    """The same rung with the loss ``cauchy``; None where its loss is robust already."""
+    if rung.loss != "linear":
+        return None
+    robust = replace(rung, name=f"{rung.name} + cauchy", loss="cauchy")
+    return robust, Step("no outliers (least squares)", rung.name, robust.name)
+
+
+def with_source(rung: Rung) -> tuple[Rung, Step] | None:
+    """The same rung with a source of finite size; None where it has nuisance terms already."""
+    if rung.nuisances:
+        return None
+    wide = replace(rung, name=f"{rung.name} + source", nuisances=("source",))
+    return wide, Step("a point source", rung.name, wide.name)
 
 
 def _same(a: Rung, b: Rung) -> bool:

@@ -2,8 +2,8 @@
 
 Every rung of the ladder is fitted to the same data with the same weights and predicts the same geometries that it has
 not seen. Rungs are ranked by the score of these predictions (:mod:`pbrdf.inversion.heldout_errors`), its uncertainty
-and that of differences from resampled folds, the same for all. The best rungs are tried again with a finite source and
-a robust loss. As the ranking chooses among many by their held-out error, the winner's own is a little too good.
+and that of differences from resampled folds, the same for all. The best rungs are tried again with a robust loss and
+with a finite source. As the ranking chooses among many by their held-out error, the winner's own is a little too good.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from pbrdf.inversion.estimates import Estimate
 from pbrdf.inversion.fit import fit
 from pbrdf.inversion.heldout_errors import Paired, PointErrors, Resampling, score, units_of
 from pbrdf.inversion.holdout import HoldOut
-from pbrdf.inversion.ladder import Ladder, Rung, Step, ladder, variations
+from pbrdf.inversion.ladder import Rung, Step, ladder, with_robust_loss, with_source
 from pbrdf.inversion.result import FitResult
 from pbrdf.models import Model
 
@@ -43,6 +43,8 @@ _FEWEST_ANGLES, _MOST_ANGLES = 3, 20
 _MOST_FOLDS = 8
 #: Wavelengths whose amplitudes are fitted apart; more are fitted one after the other.
 _MOST_WAVELENGTHS = 8
+#: Models that are tried with a robust loss for each that is tried with a source, which takes many times as long.
+_ROBUST = 4
 #: Starts of a model that is fitted again with something added.
 _VARIED_STARTS = 6
 #: Uncertainty in per cent below which a difference is one of rounding.
@@ -317,8 +319,8 @@ def compare_models(
         How to divide them, as of :func:`~pbrdf.inversion.crossvalidation.cross_validate`. None takes the angles of
         incidence where there are 3 to 20, else groups, else blocks of viewing angles; 8 folds at most.
     vary
-        How many of the best models, each in its best reading, are fitted again with a finite source, with a robust loss
-        and with both.
+        How many of the best models, each in its best reading, are fitted again with a finite source; four times as many
+        are first fitted again with a robust loss.
     starts
         Starts of each fit, and of each fold.
     seed
@@ -355,18 +357,22 @@ def compare_models(
     plan = _Plan.of(dataset, hold_out, by, folds, seed, starts, max_iterations, arguments, splits)
     fitted: list[_Fitted] = []
     failures: list[Failure] = []
-    varied = min(vary, len({rung.cls for rung in first.rungs}))
-    total = len(first.rungs) + varied * len(variations(first.rungs[0]).rungs)
+    classes = len({rung.cls for rung in first.rungs})
+    stages = ((with_robust_loss, min(_ROBUST * vary, classes)), (with_source, min(vary, classes)))
+    total = len(first.rungs) + sum(count for _, count in stages)
     _run(plan, first.rungs, fitted, failures, total, progress)
     if not fitted:
         reasons = "; ".join(dict.fromkeys(f.reason for f in failures))
         raise FitError(f"no model could be fitted: {reasons}")
     steps = list(first.steps)
-    for best in _best_of_each(fitted)[:vary]:
-        # from where the plain fit ended: few other starts are needed
-        more: Ladder = variations(replace(best.rung, model=best.result.model, options={}))
-        _run(replace(plan, starts=min(starts, _VARIED_STARTS)), more.rungs, fitted, failures, total, progress)
-        steps += more.steps
+    fewer = replace(plan, starts=min(starts, _VARIED_STARTS))
+    for vary_rung, count in stages:
+        for best in _best_of_each(fitted)[:count]:
+            # from where the fit without it ended: few other starts are needed
+            varied = vary_rung(replace(best.rung, model=best.result.model, options={}))
+            if varied is not None:
+                _run(fewer, varied[:1], fitted, failures, total, progress)
+                steps.append(varied[1])
     if progress is not None:
         progress("done", total, total)
     return _ranked(plan, fitted, failures, steps)
