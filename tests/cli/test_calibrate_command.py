@@ -172,6 +172,7 @@ def test_tables_that_cannot_be_true_are_doubted(run, tmp_path, setup):
     assert run(*CALIBRATE, "-q").stderr == ""
 
 
+@pytest.mark.slow
 def test_bad_pixels_and_regions(run, tmp_path, setup):
     """Half of the field is not lit evenly: only the region counts, and in it the saturated pixel does not."""
     for path in (tmp_path / "known").iterdir():

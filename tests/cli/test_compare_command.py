@@ -6,11 +6,14 @@ import json
 import shutil
 from pathlib import Path
 
+import pytest
+
 import own_model
 
 STARTS = ("--starts", 2, "--vary", 0)
 
 
+@pytest.mark.slow
 def test_a_bundled_paint_and_a_model_of_ones_own(run, tmp_path, monkeypatch):
     from pbrdf.models import MODELS
 
@@ -52,6 +55,7 @@ def test_a_bundled_paint_and_a_model_of_ones_own(run, tmp_path, monkeypatch):
     assert record["settings"]["hold_out"] == "group=3"
 
 
+@pytest.mark.slow
 def test_options_reach_the_comparison(run, tmp_path):
     run("simulate", "cd-back", "--plane", "--theta-i", "20,40,60", "--theta-r=-70:70:14", "-o", "data.csv")
     result = run(

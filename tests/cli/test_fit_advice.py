@@ -23,6 +23,7 @@ def turned(tmp_path):
     return path.name
 
 
+@pytest.mark.slow
 def test_the_reading_that_fits_is_recommended_and_does(run, tmp_path, turned):
     text = " ".join(run("fit", turned, "--starts", 4, "-o", "out").stdout.split())
     assert text.startswith("Verdict The model does")
@@ -43,5 +44,6 @@ def test_the_reading_that_fits_is_recommended_and_does(run, tmp_path, turned):
     assert order == sorted(order)
 
 
+@pytest.mark.slow
 def test_suggestions_can_be_left_out(run, turned):
     assert "Try next" not in run("fit", turned, "--starts", 4, "--no-suggestions", "-o", "out").stdout

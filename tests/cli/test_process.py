@@ -53,6 +53,7 @@ def test_help_and_import_load_nothing_heavy(code):
     assert done.stderr == ""
 
 
+@pytest.mark.slow
 def test_a_fit_without_figures_loads_no_plotting_library(tmp_path):
     code = (
         "import pbrdf.cli.main as m; m.app(['fit', 'white', '--starts', '1', '-q', '--no-figures', '-o', 'out'], "
@@ -91,6 +92,7 @@ def test_without_llvm_the_doctor_says_what_to_install(tmp_path):
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.slow
 def test_without_llvm_a_fit_says_what_to_install(tmp_path):
     done = process("fit", "white", cwd=tmp_path, DRJIT_LIBLLVM_PATH="/nonexistent", PBRDF_BACKEND="llvm")
     assert done.returncode == 2
@@ -111,6 +113,7 @@ def test_output_that_an_old_code_page_lacks_is_replaced(tmp_path):
     assert "pearl-white" in done.stdout
 
 
+@pytest.mark.slow
 def test_a_reader_that_cannot_be_loaded_is_one_line_and_stops_nothing(tmp_path):
     (tmp_path / "guest-1.0.dist-info").mkdir()
     (tmp_path / "guest-1.0.dist-info" / "METADATA").write_text(

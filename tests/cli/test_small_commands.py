@@ -101,6 +101,7 @@ def test_a_model_and_data_are_drawn(run, tmp_path, extension):
     assert (tmp_path / f"d.{extension}").stat().st_size > 10_000
 
 
+@pytest.mark.slow
 def test_models_data_and_fits_are_drawn_together(run, tmp_path):
     run("convert", "white", "data.csv")
     run("fit", "white", "--starts", 1, "-q", "--no-figures", "-o", "found")
@@ -123,6 +124,7 @@ def _drawn(run, folder, *arguments):
     return (folder / "again.png").read_bytes()
 
 
+@pytest.mark.slow
 def test_a_figure_is_named_after_what_it_shows(run, tmp_path):
     pbrdf.load_paint("white").to_json(tmp_path / "paint.json")
     assert run("plot", "paint.json").stdout == "paint.png\n"

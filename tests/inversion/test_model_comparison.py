@@ -61,6 +61,7 @@ def polarised():
     return found, seen
 
 
+@pytest.mark.slow
 def test_the_true_model_wins_and_what_holds_it_cannot_be_told_apart(polarised):
     found, _ = polarised
     assert found.best.name.startswith("double-gauss") and "unpolarised" not in found.best.name

@@ -54,6 +54,7 @@ def test_every_field_comes_back_bit_for_bit(result, tmp_path):
         assert same(getattr(result, f.name), getattr(again, f.name)), f.name
 
 
+@pytest.mark.slow
 def test_a_saved_fit_can_be_taken_up_again(tmp_path):
     result = pbrdf.fit(pbrdf.open_experiment("white"), starts=4, hold_out="group=3")
     written = result.save(tmp_path / "white")

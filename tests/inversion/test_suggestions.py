@@ -38,6 +38,7 @@ def advice(dataset, **arguments):
     return result, suggestions(dataset, result, arguments, until=math.inf)
 
 
+@pytest.mark.slow
 def test_outliers_lead_to_a_robust_loss():
     dataset = measured(polarised=False)
     bad = np.random.default_rng(2).choice(dataset.sizes["geometry"], 14, replace=False)
@@ -51,6 +52,7 @@ def test_outliers_lead_to_a_robust_loss():
     assert "--loss cauchy" not in [s.option for s in advice(dataset, loss="cauchy")[1]]
 
 
+@pytest.mark.slow
 def test_a_wide_source_is_found():
     wide = pbrdf.DoubleGauss(sigma=0.02, n=1.55, a=0.3, k=1.1, b=0.2, t=0.3)
     theta_i = np.deg2rad(np.repeat([20.0, 40.0, 60.0], 61))
@@ -68,6 +70,7 @@ def test_a_wide_source_is_found():
     assert source.chi2_after < source.chi2_before and "χ²" in source.sentence
 
 
+@pytest.mark.slow
 def test_colours_lead_to_an_amplitude_of_their_own():
     red = measured(PAINT.replace(a=0.1), polarised=False, wavelength=650.0)
     blue = measured(PAINT.replace(a=0.9), polarised=False, wavelength=450.0)
@@ -78,6 +81,7 @@ def test_colours_lead_to_an_amplitude_of_their_own():
     assert found[0].after < 0.05 < found[0].before
 
 
+@pytest.mark.slow
 def test_nothing_is_suggested_that_does_not_help():
     """Data without any rhyme: no loss, source or model describes them."""
     rng = np.random.default_rng(1)
@@ -111,6 +115,7 @@ def test_a_contradicted_convention_is_named(name, option):
     assert f"χ² {found[0].chi2_after:.4g} instead of {found[0].chi2_before:.4g}" in found[0].sentence
 
 
+@pytest.mark.slow
 def test_conventions_that_hold_are_not_contradicted():
     dataset = measured()
     result = pbrdf.fit(dataset, starts=4, fix={"t": 0.0})
@@ -220,6 +225,7 @@ def test_trials_are_bounded_in_size_and_time():
     assert suggestions(dataset, result, {}, until=time.monotonic() - 1.0) == []
 
 
+@pytest.mark.slow
 def test_checks_ask_for_advice_only_where_the_fit_is_not_good():
     good = measured()
     result = pbrdf.fit(good, starts=4)

@@ -109,6 +109,7 @@ def test_matrices_are_those_of_passive_surfaces(cls, seed):
     assert ref.coherency_eigenvalues(f[f00 > 1e-200] / f00[f00 > 1e-200, None, None]).min() >= -1e-12
 
 
+@pytest.mark.slow
 @EVERY
 def test_reflectance_agrees_with_brute_force(cls):
     """∫ f00 cosθ_r dω_r over a fine grid of directions, which knows nothing of lobes."""

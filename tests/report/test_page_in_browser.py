@@ -41,6 +41,7 @@ def pages(report, hemisphere_report, tmp_path_factory):
     return {name: (folder / name / "index.html").as_uri() for name in ("plane", "hemisphere")}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
 @pytest.mark.parametrize("width", [390, 1280])
 @pytest.mark.parametrize("name", ["plane", "hemisphere"])

@@ -77,6 +77,7 @@ def test_the_comparison_leaves_the_result_alone(report):
     xr.testing.assert_identical(report.result.comparison, before)
 
 
+@pytest.mark.slow
 def test_figures_come_in_every_format_that_is_asked_for(hemisphere_report, tmp_path):
     written = write_report(hemisphere_report, tmp_path / "fit", figure_format="png, pdf")
     figures = {f"{name}.{kind}" for name in ("figure", "hemisphere", "starts") for kind in ("png", "pdf")}

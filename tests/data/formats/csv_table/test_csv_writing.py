@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from dataset_strategies import datasets, same_bits
 from hypothesis import HealthCheck, given, settings
 
 from pbrdf.data import make_dataset, read, write
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(ds=datasets())
 def test_round_trip_is_bit_for_bit(tmp_path, ds):
