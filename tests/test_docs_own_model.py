@@ -12,6 +12,7 @@ from pbrdf.models import MODELS
 PAGE = Path(__file__).parents[1] / "docs" / "own-model.md"
 
 
+@pytest.mark.slow
 def test_the_page_runs(tmp_path, monkeypatch, capsys):
     MODELS._classes.pop("lambert-ggx", None)
     monkeypatch.chdir(tmp_path)

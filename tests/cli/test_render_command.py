@@ -40,6 +40,7 @@ def test_a_folder_holds_the_layers_and_the_pictures(run, tmp_path, paint):
     assert 0.0 < np.nanmax(picture.dolp) <= 1.0
 
 
+@pytest.mark.slow
 def test_one_file_has_one_figure_beside_it(run, tmp_path, paint):
     run("render", paint, paint, "--scene", "plate", "--light", "point", *SMALL, "-o", "row.exr")
     assert {path.name for path in tmp_path.iterdir()} == {"row.exr", "row.png", paint}

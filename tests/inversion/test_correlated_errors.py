@@ -214,6 +214,7 @@ def test_the_steps_of_the_papers_strategy_keep_the_covariance(one, fitted):
     assert step.chi2 == pytest.approx(diffuse.goodness.chi2, rel=1e-4)
 
 
+@pytest.mark.slow
 def test_folds_keep_the_covariance_of_the_rest(one):
     validation = cross_validate(one, starts=4)
     for number, fold in enumerate(validation.folds, start=1):
@@ -244,6 +245,7 @@ def test_the_bootstrap_agrees_with_the_standard_errors(fitted):
     np.testing.assert_allclose(spread / error, 1.0, atol=4.0 / math.sqrt(2.0 * count))
 
 
+@pytest.mark.slow
 def test_the_profile_of_a_nearly_linear_fit_agrees_with_the_standard_error(fitted):
     interval = fitted.profile(["n"]).intervals["n"]
     estimate = fitted.estimates["n"]

@@ -166,6 +166,7 @@ def test_opposite_signs_at_two_wavelengths_are_not_taken_for_chance():
     assert residual_structure([-first, -second], {"550 nm": -first, "650 nm": -second}).above == 98
 
 
+@pytest.mark.slow
 def test_strata_are_rarely_called_structured_by_chance():
     rng = np.random.default_rng(0)
     trials = []

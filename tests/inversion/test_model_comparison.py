@@ -82,6 +82,7 @@ def test_the_true_model_wins_and_what_holds_it_cannot_be_told_apart(polarised):
     assert "2.0 %" in sentences[0] or found.best.score == pytest.approx(0.025, abs=0.01)
 
 
+@pytest.mark.slow
 def test_what_polarised_body_light_buys(polarised):
     found, _ = polarised
     paired = found.paired("double-gauss, unpolarised body", "double-gauss")
@@ -141,6 +142,7 @@ def unpolarised():
     )
 
 
+@pytest.mark.slow
 def test_where_the_body_is_unpolarised_the_ablation_costs_nothing(unpolarised):
     paired = unpolarised.paired("double-gauss, unpolarised body", "double-gauss")
     assert not paired.apart and abs(paired.difference) < 0.002

@@ -90,6 +90,7 @@ def test_nothing_is_suggested_that_does_not_help():
     assert advice(noise)[1] == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "option"),
     [
@@ -122,6 +123,7 @@ def test_conventions_that_hold_are_not_contradicted():
     assert contradicted_conventions(dataset, result, {"fix": {"t": 0.0}}, until=math.inf) == []
 
 
+@pytest.mark.slow
 def test_a_degree_in_per_cent_is_found():
     """Off the lobe a degree of 0.6 % may stand in a file as 0.6."""
     dataset = measured()
@@ -136,6 +138,7 @@ def test_a_degree_in_per_cent_is_found():
     assert found[0].option == "DoLP divided by 100"
 
 
+@pytest.mark.slow
 def test_reflectance_factors_in_per_cent_are_found():
     dataset = measured()
     per_cent = dataset.assign({c: 100.0 * math.pi * dataset[c] for c in "IQU"})

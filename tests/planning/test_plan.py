@@ -254,6 +254,7 @@ def test_body_light_alone_is_read_at_the_extremes():
 # Options
 
 
+@pytest.mark.slow
 def test_camera_positions_are_as_many_as_asked():
     made = plan(THICK, NOISE, 30, camera_positions=3, starts=1)
     assert len(np.unique(made.protocol.group)) == 3
@@ -261,6 +262,7 @@ def test_camera_positions_are_as_many_as_asked():
     assert made.protocol.group.min() == 1
 
 
+@pytest.mark.slow
 def test_only_parameters_of_interest_count():
     narrow = plan(THICK, NOISE, 20, parameters=("n",), repeats=20, starts=2)
     wide = plan(THICK, NOISE, 20, repeats=20, starts=2)
@@ -277,6 +279,7 @@ def test_a_weight_lowers_the_error_it_weighs():
     assert heavy.std[at] < 0.9 * plain.std[at]
 
 
+@pytest.mark.slow
 def test_a_plan_for_an_uncertain_guess_serves_other_models_better():
     guess = load_paint("white")
     few = in_plane_candidates(guess, position_step=np.deg2rad(20.0), angle_step=np.deg2rad(10.0))
@@ -293,6 +296,7 @@ def test_a_plan_for_an_uncertain_guess_serves_other_models_better():
     assert volume(unsure) > volume(sure) + 0.1
 
 
+@pytest.mark.slow
 def test_an_error_of_the_angles_is_part_of_the_promise():
     exact, rough = (
         plan(load_paint("white"), PAPER, 40, angle_error=e, starts=1) for e in (0.0, np.deg2rad(0.05))

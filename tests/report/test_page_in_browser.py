@@ -70,6 +70,7 @@ def test_the_page_is_sound(browser, pages, tmp_path, name, width, dark):
     assert (tmp_path / "page.png").stat().st_size > 50_000
 
 
+@pytest.mark.slow
 def test_an_error_would_be_noticed(browser, tmp_path):
     """The listener hears: a page with a broken script and a missing picture makes both kinds of entry."""
     (tmp_path / "bad.html").write_text("<script>console.error('x'); nothing()</script><img src='absent.png'>")
@@ -79,6 +80,7 @@ def test_an_error_would_be_noticed(browser, tmp_path):
     assert browser.ask(IMAGES) == [""]
 
 
+@pytest.mark.slow
 def test_on_paper_it_is_black_on_white(browser, pages):
     browser.open(pages["plane"], 1280, dark=True)
     browser.call(

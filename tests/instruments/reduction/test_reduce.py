@@ -109,6 +109,7 @@ def test_several_sinks_read_the_frames_once(frames):
     np.testing.assert_array_equal(frames.reads, 1)
 
 
+@pytest.mark.slow
 def test_each_sink_gets_what_it_gets_alone(frames, tmp_path):
     together = (
         MapWriter(tmp_path / "together.nc", frames, INSTRUMENT, angles=ANGLES),
@@ -149,6 +150,7 @@ def test_only_rows_that_a_sink_needs_are_read(frames):
     np.testing.assert_array_equal(frames.reads, [expected, expected])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["nc", "zarr"])
 @pytest.mark.parametrize("where", ["enter", "prepare", "add", "exit"])
 def test_an_error_in_a_sink_closes_the_others_and_leaves_nothing(frames, tmp_path, kind, where):

@@ -30,6 +30,7 @@ def folder(compared, tmp_path_factory):
     return target
 
 
+@pytest.mark.slow
 def test_the_table_has_every_rung_once_in_the_order_of_the_ranking(compared):
     headings, rows = table(compared.comparison)
     assert headings[:5] == ["model", "free", "held-out error", "of I", "of pol."]
@@ -69,6 +70,7 @@ def test_names_of_models_are_whole_in_a_narrow_table(compared):
         assert all(word in ranking for word in contender.name.split())
 
 
+@pytest.mark.slow
 def test_the_files_hold_the_same_numbers(compared, folder):
     record = json.loads((folder / "comparison.json").read_text(encoding="utf-8"))
     with (folder / "comparison.csv").open(encoding="utf-8", newline="") as file:

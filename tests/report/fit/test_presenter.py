@@ -17,6 +17,7 @@ def result(report):
     return report.result
 
 
+@pytest.mark.slow
 def test_print_shows_the_summary_of_the_command(result):
     checks = run_checks(result, result.dataset)
     name = result.dataset.attrs["title"]

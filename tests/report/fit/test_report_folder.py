@@ -28,6 +28,7 @@ def folder(report, tmp_path_factory):
     return target
 
 
+@pytest.mark.slow
 def test_the_folder_holds_everything_and_nothing_else(folder):
     assert {path.name for path in folder.iterdir()} == NAMES
     assert [path.name for path in folder.parent.iterdir()] == ["fit"]
@@ -99,6 +100,7 @@ def test_without_figures_the_page_says_so(report, tmp_path):
     assert "<svg" not in text and "No figures were drawn" in text
 
 
+@pytest.mark.slow
 def test_other_files_of_a_folder_are_left_alone(report, tmp_path):
     (tmp_path / "notes.txt").write_text("mine")
     (tmp_path / "fit.json").write_text("old")
