@@ -96,6 +96,7 @@ def test_calibrated_reductions_are_right_where_nominal_ones_are_not(run, tmp_pat
     assert "Written: imager.toml, imager_inputs.csv, imager.png" in result.stdout
 
 
+@pytest.mark.slow
 def test_table_of_the_inputs(run, tmp_path, setup):
     """Known light and what is found; the nominal instrument's errors are those of its analyser vectors."""
     run(*CALIBRATE, "-o", "imager.toml", "-q", "--no-picture")

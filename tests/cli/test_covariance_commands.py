@@ -55,6 +55,7 @@ def test_what_is_no_covariance_is_refused(run, file, tmp_path):
     assert f"covariance, line {len(text)}: no covariance: it is not positive semidefinite" in message
 
 
+@pytest.mark.slow
 def test_covariances_survive_every_format(run, file, tmp_path):
     pytest.importorskip("zarr")
     for source, target in (("data.csv", "a.nc"), ("a.nc", "b.zarr"), ("b.zarr", "c.csv")):

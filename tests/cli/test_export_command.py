@@ -38,6 +38,7 @@ def test_a_table_for_mitsuba_tells_its_error_and_how_to_load_it(run, tmp_path, m
     assert [path.name for path in tmp_path.glob("*.pbsdf")] == ["paint.pbsdf"]
 
 
+@pytest.mark.slow
 def test_the_format_names_the_file_and_a_missing_wavelength_is_told(run, tmp_path, models):
     result = run("export", "blue.json", "--format", "pbsdf")
     assert "550 nm is written; state it with --wavelength" in result.stderr

@@ -19,6 +19,7 @@ from pbrdf.instruments.polarimeter.presets import preset
 FAST = ("--smallest-bistatic", 30, "--largest-zenith", 70, "--budget", 24)
 
 
+@pytest.mark.slow
 def test_a_plan_is_printed_and_written_with_a_picture(run, tmp_path):
     result = run("plan", "matte-white-thick", *FAST, "--angle-error", 0.05, "-o", "next.csv")
     assert "24 readings at 24 geometries, D-optimal" in result.stdout
@@ -53,6 +54,7 @@ def test_a_plan_can_be_measured_and_fitted(run, tmp_path):
             assert abs(estimate.value - truth) < 4.0 * estimate.std, name
 
 
+@pytest.mark.slow
 def test_a_measurement_is_a_folder_of_frames(run, tmp_path):
     result = run(
         *("measure", "white", "pearl-white", "--positions", "60,100", "--sample-angles", "20:70:25"),

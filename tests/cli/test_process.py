@@ -37,6 +37,7 @@ def process(*arguments, cwd: Path, **environment: str) -> subprocess.CompletedPr
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "code",
     [
@@ -78,12 +79,14 @@ def test_version(tmp_path):
     assert process("--version", cwd=tmp_path).stdout == f"pbrdf {pbrdf.__version__}\n"
 
 
+@pytest.mark.slow
 def test_a_mistake_is_one_line_and_code_2(tmp_path):
     done = process("check", "nothing.csv", cwd=tmp_path)
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr == "pbrdf: error: nothing.csv: there is no such file\n"
 
 
+@pytest.mark.slow
 def test_without_llvm_the_doctor_says_what_to_install(tmp_path):
     done = process("doctor", cwd=tmp_path, DRJIT_LIBLLVM_PATH="/nonexistent", PBRDF_BACKEND="llvm")
     assert done.returncode == 1
@@ -101,12 +104,14 @@ def test_without_llvm_a_fit_says_what_to_install(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_an_unknown_backend_in_the_environment_is_named(tmp_path):
     done = process("doctor", cwd=tmp_path, PBRDF_BACKEND="opencl")
     assert done.returncode == 1
     assert "PBRDF_BACKEND" in done.stderr
 
 
+@pytest.mark.slow
 def test_output_that_an_old_code_page_lacks_is_replaced(tmp_path):
     done = process("paints", cwd=tmp_path, PYTHONIOENCODING="ascii")
     assert done.returncode == 0

@@ -210,6 +210,7 @@ def test_a_mosaic_and_a_built_in_instrument(run, tmp_path):
     assert row["V"] == "nan"
 
 
+@pytest.mark.slow
 def test_quiet_and_into_a_folder_that_is_there(run, tmp_path, setup):
     raw, _ = setup
     np.save(tmp_path / "run.npy", raw[:1])
@@ -223,6 +224,7 @@ def test_quiet_and_into_a_folder_that_is_there(run, tmp_path, setup):
     assert (tmp_path / "out" / "summary.csv").read_text().startswith("series,region")
 
 
+@pytest.mark.slow
 def test_zarr_is_replaced_as_a_whole(run, tmp_path, setup):
     pytest.importorskip("zarr")
     raw, _ = setup

@@ -49,6 +49,7 @@ def test_mueller_matrices_and_another_light(run, tmp_path):
     assert tuple(S.attrs["illumination"]) == (1.0, 0.5, 0.0, 0.0)
 
 
+@pytest.mark.slow
 def test_noise_has_the_stated_size_and_a_seed(run, tmp_path):
     grid = ("simulate", "cd-back", "--theta-i", "40", "--theta-r", "0:80:2", "--phi", "0:355:10")
     for name, seed in (("a.nc", 1), ("b.nc", 1), ("c.nc", 2)):

@@ -27,6 +27,7 @@ def test_models_are_listed(run):
     assert "reciprocal-double-gauss" in content
 
 
+@pytest.mark.slow
 def test_the_doctor_finds_all_well(run):
     result = run("doctor")
     assert "Backend" in result.stdout
@@ -82,6 +83,7 @@ def test_what_is_wrong_is_refused(run, tmp_path):
     assert "line 2" in message
 
 
+@pytest.mark.slow
 def test_a_file_is_converted(run, refused, tmp_path):
     assert run("convert", "white", "w.nc").stdout == "w.nc: 63 geometries\n"
     run("convert", "w.nc", "w.csv", "--select", "group=2")

@@ -163,6 +163,7 @@ def test_a_format_that_can_be_written_is(tmp_path, text_file):
         write(ds, tmp_path / "again.pr2")
 
 
+@pytest.mark.slow
 def test_the_command_line_knows_registered_readers(text_file, tmp_path, monkeypatch):
     register_reader(Reader("pairs", read_pairs, extensions=(".prs",), sniff=PAIRS.sniff, write=write_pairs))
     monkeypatch.setenv("COLUMNS", "110")

@@ -22,6 +22,7 @@ def sampled(full_fit):
     return bootstrap(full_fit, COUNT, seed=1)
 
 
+@pytest.mark.slow
 def test_covariance_is_the_inverse_information(full_fit, sampled):
     names = full_fit.space.names
     error = np.array([full_fit.estimates[n].std for n in names])
@@ -46,12 +47,14 @@ def test_bias_and_percentiles_of_a_nearly_linear_fit(full_fit, sampled):
     assert sampled.failed == 0 and sampled.notes == []
 
 
+@pytest.mark.slow
 def test_the_seed_decides_the_samples(full_fit):
     first, again, other = (bootstrap(full_fit, 5, seed=s).samples for s in (3, 3, 4))
     np.testing.assert_array_equal(first, again)
     assert not np.allclose(first, other)
 
 
+@pytest.mark.slow
 def test_a_guessed_scale_is_replaced_by_that_of_the_residuals():
     """Stated uncertainties thirty times too large, of unknown scale: the samples scatter like the true noise."""
     dataset = pbrdf.open_experiment("pearl-white")
@@ -65,6 +68,7 @@ def test_a_guessed_scale_is_replaced_by_that_of_the_residuals():
         assert spread < 6.0 * known.estimates[name].std
 
 
+@pytest.mark.slow
 def test_samples_that_end_on_a_bound_are_counted():
     """t is bounded within its scatter: part of the samples stand there, the rest are inside."""
     dataset = pbrdf.open_experiment("pearl-white")

@@ -74,6 +74,7 @@ def chi2_by_hand(ds, comparison, rows):
     return total
 
 
+@pytest.mark.slow
 def test_the_covariance_of_the_data_counts_in_the_fit(one, fitted):
     """χ² is rᵀ C⁻¹ r of the measured components; where only standard uncertainties are known, C is diagonal."""
     assert fitted.goodness.chi2 == pytest.approx(chi2_by_hand(one, fitted.comparison, range(63)), rel=1e-9)
@@ -200,6 +201,7 @@ def test_held_out_rows_leave_with_their_covariance(one):
     np.testing.assert_array_equal(result.data.correlation, Observations.from_dataset(one).correlation[kept])
 
 
+@pytest.mark.slow
 def test_the_steps_of_the_papers_strategy_keep_the_covariance(one, fitted):
     result = pbrdf.fit(one, starts=8, strategy="stepwise")
     assert result.goodness.chi2 == pytest.approx(fitted.goodness.chi2, rel=1e-6)
@@ -223,6 +225,7 @@ def test_folds_keep_the_covariance_of_the_rest(one):
         assert fold.values["n"] == pytest.approx(rest.estimates["n"].value, rel=1e-4)
 
 
+@pytest.mark.slow
 def test_simulated_errors_have_the_stated_covariance(one):
     data = Observations.from_dataset(one)
     count = 20_000
@@ -237,6 +240,7 @@ def test_simulated_errors_have_the_stated_covariance(one):
     assert all(s.values[2, 4] == 0.0 for s in sets[:9]), "U was not measured there"
 
 
+@pytest.mark.slow
 def test_the_bootstrap_agrees_with_the_standard_errors(fitted):
     count = 400
     sampled = fitted.bootstrap(count, seed=2)

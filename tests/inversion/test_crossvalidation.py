@@ -87,6 +87,7 @@ def test_an_amplitude_of_each_group_is_predicted_from_those_of_the_others():
         assert fold.values[f"a[{g}]"] == pytest.approx(np.sqrt(others[0] * others[1]), rel=1e-6)
 
 
+@pytest.mark.slow
 def test_a_fold_is_the_fit_that_holds_it_out():
     dataset = pbrdf.open_experiment(PAINT)
     result = cross_validate(dataset, starts=8)
@@ -108,6 +109,7 @@ def test_a_fold_is_the_fit_that_holds_it_out():
     )
 
 
+@pytest.mark.slow
 def test_the_right_model_predicts_to_the_noise():
     """The bundled data follow the model with their stated noise: the score is 1 within its own scatter."""
     result = cross_validate(pbrdf.open_experiment(PAINT), starts=4, by="fraction", folds=4)

@@ -194,6 +194,7 @@ def test_the_analysis_tests_groups_and_wavelengths():
     assert structure.stratum in ("550 nm", "650 nm") and abs(structure.above - structure.below) == 4
 
 
+@pytest.mark.slow
 def test_the_right_model_leaves_chance_and_a_wrong_one_structure():
     """Without its polarised diffuse part (t = 0) the model's DoLP lies below the data right of the peak."""
     dataset = pbrdf.open_experiment("matte-white-thick")

@@ -120,6 +120,7 @@ def test_data_without_noise_give_the_truth_back():
     assert result.optima[0].count >= 16
 
 
+@pytest.mark.slow
 def test_out_of_plane_data_of_the_other_readings_are_fitted():
     angles = in_plane([30, 60], np.arange(-70, 75, 10))
     phi = np.linspace(0.0, np.pi, len(angles[0]))
@@ -134,6 +135,7 @@ def test_out_of_plane_data_of_the_other_readings_are_fitted():
             assert result.estimates[name].value == pytest.approx(model.values[name], rel=1e-4)
 
 
+@pytest.mark.slow
 def test_full_mueller_data_of_an_absorbing_coating():
     """With circular light the extinction κ shows in M34; the sign convention carries through the fit."""
     model = pbrdf.DoubleGauss(0.2, 1.6 - 0.8j, 0.4, 1.1, 0.0, 0.5)
@@ -242,6 +244,7 @@ def test_fixed_parameters_stay_and_starts_begin_where_told():
     np.testing.assert_allclose(result.start_values[:, 4], 0.3)
 
 
+@pytest.mark.slow
 def test_held_out_data_do_not_touch_the_fit():
     dataset = pbrdf.open_experiment("pearl-white")
     spoilt = dataset.copy(deep=True)

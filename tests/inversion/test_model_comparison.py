@@ -155,6 +155,7 @@ def test_where_the_body_is_unpolarised_the_ablation_costs_nothing(unpolarised):
     )
 
 
+@pytest.mark.slow
 def test_one_split_is_that_of_a_fit(unpolarised):
     single = pbrdf.fit(simulated(TRUTH.replace(t=0.0), channels="I"), hold_out="theta_i=35", starts=4)
     found = unpolarised["double-gauss"]
@@ -194,6 +195,7 @@ def at_wavelengths(*pairs):
     )
 
 
+@pytest.mark.slow
 def test_amplitudes_are_free_for_each_wavelength():
     blue, red = simulated(TRUTH, channels="I"), simulated(TRUTH.replace(a=0.1), channels="I")
     ablated = Rung("t = 0", DoubleGauss, fix={"t": 0.0})

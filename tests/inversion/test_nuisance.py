@@ -48,6 +48,7 @@ def pull(estimate, truth):
     return abs(estimate.value - truth) / estimate.std
 
 
+@pytest.mark.slow
 def test_gain_of_a_camera_is_told_from_the_amplitude():
     """DN = gain · f · cosθ_i: the specular peak fixes the gain, and a becomes the coating's own."""
     theta_i, theta_r, group = protocol()
@@ -60,6 +61,7 @@ def test_gain_of_a_camera_is_told_from_the_amplitude():
     assert 0.6 < result.goodness.reduced_chi2 < 1.4
 
 
+@pytest.mark.slow
 def test_gains_of_camera_positions_and_the_prediction_of_an_unseen_one():
     theta_i, theta_r, group = protocol()
     gains = {1: 1.0, 2: 1.1, 3: 1.05}
@@ -91,6 +93,7 @@ def test_dark_offset_is_constant_on_the_datas_own_scale():
     assert pull(result.estimates["k"], 1.2) < 4.0
 
 
+@pytest.mark.slow
 def test_angle_offsets_of_camera_positions():
     """The sample turned by δ raises θ_i by δ and lowers signed θ_r by δ."""
     theta_i, theta_r, group = protocol()
@@ -144,6 +147,7 @@ def test_an_extended_source_is_the_average_over_its_disc():
         assert abs(point / expected - 1.0) > 0.03, "the source must matter in this test"
 
 
+@pytest.mark.slow
 def test_radius_of_the_source_is_found_and_sigma_with_it():
     theta_i, theta_r, group = protocol()
     space = Space(
@@ -165,6 +169,7 @@ def test_radius_of_the_source_is_found_and_sigma_with_it():
     assert blind.estimates["sigma"].value > 0.051, "without the source the lobe looks wider"
 
 
+@pytest.mark.slow
 def test_one_amplitude_for_each_wavelength_and_the_rest_shared():
     theta_i, theta_r, group = protocol(count=15)
     amplitudes = {450.0: 0.3, 550.0: 0.6, 650.0: 0.9}

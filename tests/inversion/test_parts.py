@@ -155,6 +155,7 @@ def test_equal_weights_are_equal_and_their_scale_unknown():
     np.testing.assert_allclose(stated.std[0], 0.01 * np.abs(dataset["I"]))
 
 
+@pytest.mark.slow
 def test_the_papers_objective_compares_intensity_and_dolp():
     dataset = pbrdf.open_experiment("matte-white-thick")
     data = Observations.from_dataset(dataset, objective="paper")
@@ -170,6 +171,7 @@ def test_the_papers_objective_compares_intensity_and_dolp():
     assert result.estimates["t"].std > signed.estimates["t"].std
 
 
+@pytest.mark.slow
 def test_a_full_covariance_counts_as_generalised_least_squares():
     """χ² = Σ rᵀ C⁻¹ r; a diagonal covariance is the standard uncertainties."""
     dataset = pbrdf.open_experiment("cd-back")

@@ -37,6 +37,7 @@ def well_measured():
     return pbrdf.fit(dataset, WELL, starts=2), dataset
 
 
+@pytest.mark.slow
 def test_a_plausible_fit_gets_no_objection(well_measured):
     result, dataset = well_measured
     found = findings(result, dataset)
@@ -48,6 +49,7 @@ def test_a_plausible_fit_gets_no_objection(well_measured):
     assert "everywhere out of the plane of incidence" in found["range"][0].sentence
 
 
+@pytest.mark.slow
 def test_a_surface_that_reflects_more_than_it_receives_is_a_violation():
     bright = WELL.replace(a=1.8)
     dataset = measured(bright, [20.0, 50.0], np.arange(-70.0, 75.0, 10.0))
@@ -75,6 +77,7 @@ def test_a_fitted_gain_is_named_as_what_the_energy_rests_on():
     assert energy.severity is Severity.NOTE and "rests on the fitted gain" in energy.sentence
 
 
+@pytest.mark.slow
 def test_parameters_at_bounds_and_undetermined_ones_are_named():
     dataset = measured(WELL, [20.0, 50.0], np.arange(-70.0, 75.0, 10.0))
     at_bound = findings(pbrdf.fit(dataset, starts=4, bounds={"n": (1.2, 1.5)}))["parameters"]
@@ -87,6 +90,7 @@ def test_parameters_at_bounds_and_undetermined_ones_are_named():
     assert any("is not determined by these data" in f.sentence for f in free)
 
 
+@pytest.mark.slow
 def test_an_unmeasured_lobe_is_a_warning():
     """σ and n then rest on the diffuse part alone."""
     away = measured(WELL, [20.0], [-60.0, -40.0, -20.0, 0.0, 60.0, 70.0])
@@ -102,6 +106,7 @@ def test_an_unmeasured_lobe_is_a_warning():
         assert lobe.sentence.startswith("Only 1 fitted point lies" if count else "No fitted point")
 
 
+@pytest.mark.slow
 def test_held_out_points_beyond_the_fitted_range_are_counted():
     dataset = measured(WELL, [20.0, 40.0, 60.0], np.arange(0.0, 75.0, 10.0))
     inner = findings(pbrdf.fit(dataset, WELL, starts=1, hold_out="theta_i=40"))["range"]

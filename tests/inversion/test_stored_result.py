@@ -47,6 +47,7 @@ def result(request):
     return pbrdf.fit(pbrdf.open_experiment("matte-white-thick"), starts=4, **ARGUMENTS[request.param])
 
 
+@pytest.mark.slow
 def test_every_field_comes_back_bit_for_bit(result, tmp_path):
     write_result(result, tmp_path / "fit.nc")
     again = read_result(tmp_path / "fit.nc")
@@ -65,6 +66,7 @@ def test_a_saved_fit_can_be_taken_up_again(tmp_path):
         assert again.profile(["n"], points=5).intervals == result.profile(["n"], points=5).intervals
 
 
+@pytest.mark.slow
 def test_a_model_of_ones_own_must_be_known_before(tmp_path):
     paint = LambertGGX(0.1, 1.5, 0.3)
     theta = np.deg2rad(np.arange(0.0, 80.0, 5.0))

@@ -22,6 +22,7 @@ def results():
     }
 
 
+@pytest.mark.slow
 def test_polished_steps_end_at_the_joint_optimum(results):
     for name in FREE:
         assert results["polished"].estimates[name].value == pytest.approx(
@@ -82,6 +83,7 @@ def test_steps_find_the_narrow_lobe_too():
     assert steps.optima[0].count >= 4 and joint.optima[0].count >= 4
 
 
+@pytest.mark.slow
 def test_held_out_data_are_not_used_in_any_step():
     dataset = pbrdf.open_experiment("cd-back")
     result = pbrdf.fit(dataset, starts=8, strategy="stepwise", hold_out="group=3")

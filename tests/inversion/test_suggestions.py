@@ -211,6 +211,7 @@ def test_the_best_model_and_the_best_loss_are_tried_together(monkeypatch):
     assert len(options(errors=errors)) == 2
 
 
+@pytest.mark.slow
 def test_trials_are_bounded_in_size_and_time():
     dataset = measured(polarised=False)
     many = dataset.isel(geometry=np.arange(6 * dataset.sizes["geometry"]) % dataset.sizes["geometry"])

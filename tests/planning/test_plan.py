@@ -55,6 +55,7 @@ def relative_errors(model, protocol, noise=NOISE):
 # What the information is
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", [THICK, load_paint("pearl-white")], ids=["thick", "pearl"])
 def test_information_is_that_of_a_fit_at_the_truth(model):
     protocol = Protocol.in_plane()
@@ -72,6 +73,7 @@ def test_information_is_that_of_a_fit_at_the_truth(model):
         assert std == pytest.approx(result.estimates[name].std, rel=1e-5), name
 
 
+@pytest.mark.slow
 def test_information_takes_the_whole_covariance_of_the_instrument():
     protocol = Protocol.two_axes(
         np.deg2rad([40.0, 80.0, 110.0]), np.deg2rad([25.0, 40.0, 55.0, 70.0]), np.deg2rad([0.0, 15.0])
@@ -151,6 +153,7 @@ def test_a_tilt_of_the_sample_turns_p_before_the_camera():
 # Against simulated measurements
 
 
+@pytest.mark.slow
 def test_expected_errors_are_the_scatter_of_refits():
     made = plan(THICK, NOISE, 30, starts=2)
     protocol = made.protocol
@@ -183,6 +186,7 @@ def test_expected_errors_are_the_scatter_of_refits():
 # Against other plans
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("criterion", ["D", "A"])
 def test_a_plan_beats_the_papers_and_random_ones(criterion):
     made = plan(THICK, NOISE, 63, criterion=criterion, starts=2)
@@ -271,6 +275,7 @@ def test_only_parameters_of_interest_count():
     assert narrow.std.size == 6, "the others are still fitted"
 
 
+@pytest.mark.slow
 def test_a_weight_lowers_the_error_it_weighs():
     plain, heavy = (
         plan(THICK, NOISE, 30, criterion="A", weights=w, repeats=30, starts=2) for w in ({}, {"sigma": 30.0})
@@ -318,6 +323,7 @@ def test_candidates_keep_their_limits_and_resolve_the_lobe(make):
     assert flat.all() == (make is in_plane_candidates)
 
 
+@pytest.mark.slow
 def test_a_plan_out_of_plane_is_better_still():
     inside = plan(THICK, NOISE, 30, repeats=30, starts=1)
     outside = plan(THICK, NOISE, 30, repeats=30, starts=1, candidates=out_of_plane_candidates(THICK))

@@ -226,6 +226,7 @@ def test_parts_add_up():
     assert np.all(call(mi, bsdf.eval, wi, wo, ctx=nothing) == 0.0)
 
 
+@pytest.mark.slow
 def test_importance_is_the_adjoint():
     """Transported importance: the light travels from ``wi`` to ``wo``, so the matrix is that of the path reversed."""
     mi = use("llvm_ad_mono_polarized")

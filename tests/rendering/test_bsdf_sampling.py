@@ -241,6 +241,7 @@ def test_mean_weight_of_importance_is_the_directional_hemispherical_reflectance(
     assert abs(weight.mean() - expected) < 4.0 * weight.std() / 1e3 + 2e-4 * expected
 
 
+@pytest.mark.slow
 def test_weights_are_bounded():
     """Visible facets: facets that are drawn weigh at most the Fresnel reflectance over their share of the samples."""
     mi = use("llvm_ad_mono")

@@ -53,6 +53,7 @@ def test_the_wheel_arch_is_open(panel):
     assert rho.min() > WHEEL_RADIUS
 
 
+@pytest.mark.slow
 def test_pieces_of_the_panel_make_up_the_whole(panel):
     pieces = panel.split_along_x(3, -2.0, 1.6)
     assert sum(len(piece.faces) for piece in pieces) == len(panel.faces)

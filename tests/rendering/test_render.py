@@ -70,6 +70,7 @@ def test_v_is_positive_for_left_circular_light(mitsuba, fast, v):
     assert stokes[1:] / stokes[0] == pytest.approx([0.0, 0.0, v], abs=0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("angle", [0.0, 30.0, 75.0, 120.0])
 def test_the_view_through_a_polariser_is_that_of_a_sheet_before_the_camera(mitsuba, angle):
     """½ (S0 + S1 cos2α + S2 sin2α) of the picture without a polariser, against a rendered one with Mitsuba's own sheet.
@@ -100,6 +101,7 @@ def test_angles_that_differ_by_half_a_turn_are_the_same_polariser(mitsuba):
     assert picture.through_polarizer(20.0 * DEG) == pytest.approx(picture.stokes[0], rel=1e-3)
 
 
+@pytest.mark.slow
 def test_standard_errors_are_those_of_independent_pictures(mitsuba):
     """Pictures with other seeds scatter by the stated standard errors, in every component."""
     what = subject("sphere", [COAT])
@@ -113,6 +115,7 @@ def test_standard_errors_are_those_of_independent_pictures(mitsuba):
     assert np.abs(np.mean(pull, axis=1)).max() < 0.15
 
 
+@pytest.mark.slow
 def test_standard_errors_fall_with_the_root_of_the_samples(mitsuba):
     scene = make_scene(subject("sphere", [COAT]), "constant", (32, 32))
     few, many = (render_stokes(scene, spp=spp, seed=3) for spp in (32, 512))
@@ -134,6 +137,7 @@ def test_one_pass_tells_no_errors(mitsuba):
     assert np.isnan(render_stokes(scene, spp=1).std).all()
 
 
+@pytest.mark.slow
 def test_a_spectral_variant_gives_the_luminance():
     """Of grey things in even light the luminance is what one wavelength gives."""
     found = {}

@@ -52,6 +52,7 @@ def test_errors_name_file_and_line(text_file, old, new, words):
         read(text_file(SMALL.replace(old, new), "paint.brdf"))
 
 
+@pytest.mark.slow
 def test_krylon_has_its_gloss_peak_in_the_forward_direction(measured):
     ds = read(measured("krylon/krylon_blue.brdf"), wavelength=[460, 550])
     assert ds.sizes["geometry"] == 2 * 1439

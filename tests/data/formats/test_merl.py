@@ -105,10 +105,12 @@ def test_exchanging_source_and_viewer_finds_the_same_cell(planes):
     assert_array_equal(look_up(planes, theta_i, theta_r, phi), look_up(planes, theta_r, theta_i, -phi))
 
 
+@pytest.mark.slow
 def test_what_was_written_comes_back(file, planes):
     assert_allclose(read_planes(file), planes, rtol=1e-15)
 
 
+@pytest.mark.slow
 def test_a_data_set_holds_the_valid_cells_at_their_middle(file, planes):
     ds = read(file, every=2)
     planes = planes[:, ::2, ::2, ::2]

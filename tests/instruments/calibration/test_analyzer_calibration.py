@@ -83,6 +83,7 @@ def test_covariance_of_the_analyser_vectors():
     assert (ratio > 0.8).all() and (ratio < 1.5).all()
 
 
+@pytest.mark.slow
 def test_accuracy_is_that_of_light_not_calibrated_with():
     """An instrument with small errors, taken for nominal: `verify` finds the stated 1 % and 5 %, linear and circular
     apart; calibrated, what is left is the noise of the readings."""

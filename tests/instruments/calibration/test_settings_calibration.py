@@ -191,6 +191,7 @@ def test_inputs_held_out_verify():
     assert found.polarimeter.accuracy == (found.accuracy.linear, found.accuracy.circular)
 
 
+@pytest.mark.slow
 def test_each_input_held_out_in_turn():
     """The settings are those of all inputs; what each input is found to be comes from a fit without it, as if it alone
     had been held out. A dark input verifies nothing."""

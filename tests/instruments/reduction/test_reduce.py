@@ -98,6 +98,7 @@ def stored(path):
         return file.load()
 
 
+@pytest.mark.slow
 def test_several_sinks_read_the_frames_once(frames):
     sinks = [
         RegionCollector(REGIONS, frames, INSTRUMENT),
@@ -165,6 +166,7 @@ def test_an_error_in_a_sink_closes_the_others_and_leaves_nothing(frames, tmp_pat
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_broken_frames_leave_nothing(frames, tmp_path):
     frames.array[1, 2, 300, 4] = 5000
     other = Recorder()
@@ -175,6 +177,7 @@ def test_broken_frames_leave_nothing(frames, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_no_thread_is_at_work_when_a_sink_is_left(frames):
     slow = Recorder(pause=0.005)
     with pytest.raises(RuntimeError, match="no more in add"):

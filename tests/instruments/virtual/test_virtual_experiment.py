@@ -63,6 +63,7 @@ def test_without_noise_the_data_are_the_model(protocol):
     assert "SIMULATED" in dataset.attrs["source"]
 
 
+@pytest.mark.slow
 def test_samples_lie_side_by_side_and_share_the_exposure():
     samples = {name: load_paint(name) for name in PAINTS}
     measurement = VirtualExperiment(
@@ -199,6 +200,7 @@ def test_angle_errors_put_the_light_elsewhere_but_not_the_table():
     assert np.abs(dataset["I"].values / measurement.exact("thick")[:, 0] - 1.0).max() > 0.02
 
 
+@pytest.mark.slow
 def test_a_wrong_zero_of_the_sample_angle_is_found_by_the_fit_with_the_sign_of_the_incidence():
     """The sample turned on by ε has θ_i − ε, the fit's nuisance term is what θ_i is larger by: −ε."""
     protocol = Protocol.in_plane()

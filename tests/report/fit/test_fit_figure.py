@@ -63,6 +63,7 @@ def test_differences_are_those_of_the_comparison(figure, report):
     np.testing.assert_allclose(np.sort(drawn), np.sort(expected.values))
 
 
+@pytest.mark.slow
 def test_points_out_of_plane_are_compared_with_the_model(hemisphere_report):
     figure = fit_figure(hemisphere_report)
     cut, agreement = figure.axes
@@ -78,6 +79,7 @@ def test_points_out_of_plane_are_compared_with_the_model(hemisphere_report):
     assert len(lines(cut, "model")) == 3
 
 
+@pytest.mark.slow
 def test_a_partly_held_out_cut_says_so(report):
     result = pbrdf.fit(report.dataset, hold_out="fraction=0.3", starts=2)
     figure = fit_figure(Report(result, report.dataset, "x"))
@@ -104,6 +106,7 @@ def test_curves_include_what_the_instrument_adds(report):
     np.testing.assert_allclose(at, points.get_ydata(), rtol=0.05)
 
 
+@pytest.mark.slow
 def test_the_points_of_the_diffuse_step_are_marked():
     """Stepwise: a white dot on every point outside the lobe, and none without the strategy."""
     dataset = pbrdf.open_experiment("cd-back")

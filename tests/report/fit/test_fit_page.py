@@ -46,6 +46,7 @@ def section(text, title):
     return words(text.split(f"<h2>{title}</h2>")[1].split("</section>")[0])
 
 
+@pytest.mark.slow
 def test_the_questions_are_answered_in_order(whole):
     text = page_text(whole, {}, ["fit.json"])
     assert re.findall("<h2>(.*?)</h2>", text) == SECTIONS
@@ -66,6 +67,7 @@ def test_the_prediction_is_that_of_the_result(whole):
     assert f"all 21 {100.0 * whole.result.predicted['all'].intensity_median:.2f} %" in said
 
 
+@pytest.mark.slow
 def test_without_anything_held_out_it_says_what_that_means(hemisphere_report):
     result = pbrdf.fit(hemisphere_report.dataset, starts=2, fix={"t": 0.5})
     said = section(

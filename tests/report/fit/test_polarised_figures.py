@@ -33,6 +33,7 @@ def test_stokes_vectors_have_four_panels(report):
     np.testing.assert_allclose(np.sort(drawn), np.sort(ds["Q"].values / ds["I"].values), rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_curves_of_polarised_light_are_the_model(report):
     figure = polarisation_figure(report)
     curve = lines(figure.axes[0], "model")[0]
@@ -47,6 +48,7 @@ def test_curves_of_polarised_light_are_the_model(report):
     np.testing.assert_allclose(angle[seen], np.where(stokes[seen, 1] > 0.0, 0.0, 90.0), atol=1e-5)
 
 
+@pytest.mark.slow
 def test_a_fit_of_sixteen_elements_draws_sixteen_panels(mueller_report):
     figure = polarisation_figure(mueller_report)
     assert len(figure.axes) == 16

@@ -59,6 +59,7 @@ def test_the_record_has_the_numbers_of_the_result(folder, report):
     assert record["uncertainties_from_data"] is True
 
 
+@pytest.mark.slow
 def test_the_comparison_is_in_degrees_and_explains_itself(folder, report):
     with xr.open_dataset(folder / "comparison.nc", engine="h5netcdf") as stored:
         expected = report.result.comparison
@@ -93,6 +94,7 @@ def test_an_unknown_format_is_refused_before_anything_is_written(report, tmp_pat
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_without_figures_the_page_says_so(report, tmp_path):
     written = write_report(report, tmp_path / "fit", figures=False)
     assert {path.name for path in written} == NUMBERS

@@ -157,6 +157,7 @@ def test_dark_geometries_are_blamed_for_a_large_rms(report):
     assert "trust the median" not in summary_text(report)
 
 
+@pytest.mark.slow
 def test_angles_of_the_instrument_are_in_degrees(report):
     result = pbrdf.fit(report.dataset, nuisances=["angle"], starts=2)
     text = summary_text(Report(result, report.dataset, "x"))

@@ -78,6 +78,7 @@ def test_a_map_shows_where_it_is_how_good(made):
     assert labels[3] == "03" and labels[4] == "04 *"
 
 
+@pytest.mark.slow
 def test_without_v_there_is_no_circular_panel():
     nominal = rotating_polarizer(np.deg2rad([0, 45, 90, 135]))
     found = calibration(nominal, nominal, 12)

@@ -48,6 +48,7 @@ def test_of_many_series_evenly_spread_ones_are_drawn(tmp_path, monkeypatch):
     assert [float(picture.intensity.mean()) for picture in pictures] == [100.0, 102.0, 104.0]
 
 
+@pytest.mark.slow
 def test_one_series_needs_no_overview(tmp_path):
     assert drawn(tmp_path, ("only one",)) == ["picture_only_one.png"]
 
@@ -57,6 +58,7 @@ def test_names_that_a_file_cannot_have(tmp_path):
     assert drawn(tmp_path, ("a/b", "a:b")) == ["overview.png", "picture_a_b.png", "picture_a_b_2.png"]
 
 
+@pytest.mark.slow
 def test_an_error_leaves_no_pictures(tmp_path):
     frames = ArrayFrames(np.zeros((2, 4, 6, 5), np.uint16), ("a", "b"))
     (tmp_path / "other.png").touch()

@@ -106,6 +106,7 @@ def panels(figure):
     return [ax for ax in figure.axes if ax.get_title()]
 
 
+@pytest.mark.slow
 def test_angles_half_a_turn_apart_have_one_colour_and_others_not():
     """The colours are cyclic: −90° and 90° are the same light and look the same, 0° does not."""
     figure = quicklook_figure(picture_of(np.array([[-89.9, 89.9], [0.0, 45.0]])), "angles")
@@ -117,6 +118,7 @@ def test_angles_half_a_turn_apart_have_one_colour_and_others_not():
     np.testing.assert_allclose(between, colormaps["twilight"](0.75)[:3], atol=0.02)
 
 
+@pytest.mark.slow
 def test_the_compass_shows_each_angle_in_its_own_direction():
     """Light polarised along a direction in the picture has the colour that the disc shows there, y upwards."""
     figure = quicklook_figure(picture_of(np.array([[40.0]])), "angles")
@@ -128,6 +130,7 @@ def test_the_compass_shows_each_angle_in_its_own_direction():
     np.testing.assert_allclose(colours_at(figure, compass, directions), expected, atol=0.06)
 
 
+@pytest.mark.slow
 def test_masked_pixels_are_marked_in_every_panel_and_named():
     mask = np.array([[0, 1], [2, 3]])
     figure = quicklook_figure(picture_of(np.zeros((2, 2)), mask), "masked")
@@ -141,6 +144,7 @@ def test_masked_pixels_are_marked_in_every_panel_and_named():
     assert [text.get_text() for text in legend.get_texts()] == ["saturated", "dead", "dark"]
 
 
+@pytest.mark.slow
 def test_uncertain_angles_are_grey():
     picture = picture_of(np.full((2, 2), 45.0))
     picture.aolp_std[0, 1] = 25.0

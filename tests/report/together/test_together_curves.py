@@ -43,6 +43,7 @@ def test_two_models_differ_in_more_than_colour():
     assert first.get_color() != second.get_color()
 
 
+@pytest.mark.slow
 def test_a_model_follows_the_cuts_of_the_data(fitted):
     figure = curves_figure([fitted, Source("other", OTHER)])
     titles = [ax.get_title() for ax in figure.axes[:3]]

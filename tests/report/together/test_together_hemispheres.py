@@ -51,6 +51,7 @@ def test_without_a_wish_the_middle_incidence_is_drawn(hemisphere):
     assert incidence_of([Source("paint", PAINT)], 51.0) == 51.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sigma", [0.15, 0.004])
 def test_measured_points_lie_on_the_polar_surface(hemisphere, sigma):
     """The data are the model with 2 % scatter: their distances from the origin are those of the surface."""
