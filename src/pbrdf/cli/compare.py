@@ -95,7 +95,8 @@ def compare(
     """
     from pbrdf.files.atomic import require_writable_folder
     from pbrdf.files.digest import sha256_of
-    from pbrdf.report.comparison.folder import FIGURE_FORMATS, write_comparison
+    from pbrdf.report.comparison.folder import write_comparison
+    from pbrdf.report.style import FIGURE_FORMATS
 
     if figure_format not in FIGURE_FORMATS:
         raise PbrdfError(f"--figure-format {figure_format!r}: choose one of {', '.join(FIGURE_FORMATS)}")

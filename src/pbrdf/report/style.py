@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 __all__ = [
     "BLUE",
     "DISTINCT_COLOURS",
+    "FIGURE_FORMATS",
     "GREY",
     "RED",
     "Look",
@@ -53,6 +54,13 @@ _RC: dict[str, Any] = {
     "pdf.fonttype": 42,
 }
 _DOTS_PER_INCH = 140
+#: Formats that figures are written in, with what Matplotlib is told. No dates, so that the same figure is the same
+#: file; PNG little compressed, as that takes half as long.
+FIGURE_FORMATS: dict[str, dict[str, Any]] = {
+    "png": {"dpi": _DOTS_PER_INCH, "pil_kwargs": {"compress_level": 1}},
+    "pdf": {"metadata": {"CreationDate": None}},
+    "svg": {"metadata": {"Date": None}},
+}
 
 
 @contextmanager
@@ -160,13 +168,7 @@ def save_figure(figure: Figure, path: Path) -> None:
         If the format is not known or the file cannot be written.
     """
     kind = path.suffix.lower().removeprefix(".")
-    # No dates, so that the same figure is the same file; PNG little compressed, as that takes half as long.
-    options: dict[str, dict[str, Any]] = {
-        "png": {"dpi": _DOTS_PER_INCH, "pil_kwargs": {"compress_level": 1}},
-        "pdf": {"metadata": {"CreationDate": None}},
-        "svg": {"metadata": {"Date": None}},
-    }
-    if kind not in options:
-        raise DataError(f"{path}: figures are written as {', '.join('.' + k for k in options)}")
+    if kind not in FIGURE_FORMATS:
+        raise DataError(f"{path}: figures are written as {', '.join('.' + k for k in FIGURE_FORMATS)}")
     with styled(), atomic_file(path) as target:
-        figure.savefig(target, format=kind, **options[kind])
+        figure.savefig(target, format=kind, **FIGURE_FORMATS[kind])

@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
 from pbrdf.models.arrays import Matrix, is_zero
 from pbrdf.models.parameters import Parameter
-from pbrdf.models.parts.facets import Density, Facets
-from pbrdf.models.parts.part import Renamed
+from pbrdf.models.parts.facets import Density
+from pbrdf.models.parts.second_lobe import SecondLobe
 from pbrdf.optics.geometry import Geometry
 from pbrdf.optics.interference import two_beam_interference
 
@@ -60,7 +59,7 @@ _SAID: dict[str, dict[str, Any]] = {
 }
 
 
-class Flakes(Renamed):
+class Flakes(SecondLobe):
     """Facets of a density under the names ``flake_…``, under a V-cavity. Reciprocal; conserves energy for ζ₂ ≤ 1.
 
     Parameters
@@ -70,10 +69,7 @@ class Flakes(Renamed):
     """
 
     def __init__(self, density: Density) -> None:
-        facets = Facets(density, ("v-cavity",), strength=True)
-        own = {p.name for p in facets.parameters}
-        super().__init__(facets, {old: new for old, new in _NAMES.items() if old in own})
-        self.parameters = tuple(replace(p, **_SAID[p.name]) for p in self.parameters)
+        super().__init__(density, _NAMES, _SAID)
 
 
 _FILM = (

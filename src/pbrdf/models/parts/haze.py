@@ -5,11 +5,10 @@ The formula is the facets' (:mod:`pbrdf.models.parts.facets`), the index that of
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
-from pbrdf.models.parts.facets import Density, Facets
-from pbrdf.models.parts.part import Renamed
+from pbrdf.models.parts.facets import Density
+from pbrdf.models.parts.second_lobe import SecondLobe
 
 __all__ = ["Haze"]
 
@@ -29,7 +28,7 @@ _SAID: dict[str, dict[str, Any]] = {
 }
 
 
-class Haze(Renamed):
+class Haze(SecondLobe):
     """Facets of a density under the names ``haze_…``, under a V-cavity. Reciprocal; conserves energy for ζ₂ ≤ 1.
 
     Parameters
@@ -39,7 +38,4 @@ class Haze(Renamed):
     """
 
     def __init__(self, density: Density) -> None:
-        facets = Facets(density, ("v-cavity",), strength=True)
-        own = {p.name for p in facets.parameters}
-        super().__init__(facets, {old: new for old, new in _NAMES.items() if old in own})
-        self.parameters = tuple(replace(p, **_SAID.get(p.name, {})) for p in self.parameters)
+        super().__init__(density, _NAMES, _SAID)

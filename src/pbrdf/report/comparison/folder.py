@@ -20,9 +20,7 @@ from pbrdf.version import __version__
 if TYPE_CHECKING:
     from markupsafe import Markup
 
-__all__ = ["FIGURE_FORMATS", "comparison_record", "write_comparison"]
-
-FIGURE_FORMATS = ("png", "pdf", "svg")
+__all__ = ["comparison_record", "write_comparison"]
 
 _CSV_COLUMNS = (
     "rank", "model", "free", "score", "score_std", "behind_best", "behind_best_std", "told_apart",

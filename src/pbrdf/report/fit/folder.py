@@ -19,6 +19,7 @@ from pbrdf.report.fit.subject import Report
 from pbrdf.report.fit.summary import summary_text
 from pbrdf.report.numbers import plain, shown_unit
 from pbrdf.report.page import figure as framed
+from pbrdf.report.style import FIGURE_FORMATS
 from pbrdf.version import __version__
 
 if TYPE_CHECKING:
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
     from pbrdf.inversion.verdict import Verdict
 
 __all__ = [
-    "FIGURE_FORMATS",
     "PAGE",
     "comparison_file",
     "fit_record",
@@ -37,7 +37,6 @@ __all__ = [
     "write_report",
 ]
 
-FIGURE_FORMATS = ("png", "pdf", "svg")
 #: Name of the page in the folder of a fit.
 PAGE = "index.html"
 
