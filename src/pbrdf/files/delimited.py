@@ -15,6 +15,9 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from pbrdf.errors import DataError
 from pbrdf.files.atomic import atomic_file
 from pbrdf.files.text import first_bytes, lines_of, read_lines
@@ -48,6 +51,8 @@ class Table:
         Number of the line of column names.
     decimal_comma
         Whether numbers may have decimal commas: the separator is none.
+    units
+        What a row of units under the names says of each column, ``""`` where nothing; None where there is no such row.
     """
 
     path: Path
@@ -57,6 +62,7 @@ class Table:
     comments: list[tuple[int, str]]
     names_line: int
     decimal_comma: bool
+    units: list[str] | None = None
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -117,9 +123,9 @@ class Table:
             return float(cell.replace(",", "."))
         raise DataError(f"{self.place(row, column)}: {cell!r} is not a number")
 
-    def numbers(self, column: int, missing: Collection[str] = ()) -> list[float]:
-        """The numbers of a column, as :meth:`number` reads them."""
-        return [self.number(row, column, missing) for row in range(len(self))]
+    def numbers(self, column: int, missing: Collection[str] = ()) -> NDArray[np.float64]:
+        """The numbers of a column, as :meth:`number` reads them; shape (N,)."""
+        return np.array([self.number(row, column, missing) for row in range(len(self))], dtype=np.float64)
 
     def require_rows(self) -> None:
         """Raises DataError if there are only column names."""
