@@ -33,6 +33,8 @@ benchmark: $(TEST_STAMP)
 	$(BIN)/python benchmarks/virtual_experiments.py
 	$(BIN)/python benchmarks/coverage.py
 	$(BIN)/python benchmarks/rendering.py
+	$(BIN)/python benchmarks/domain.py
+	$(BIN)/python benchmarks/domain.py --single
 
 $(VENV)/bin/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \

@@ -26,6 +26,10 @@ __all__ = ["CHUNK", "Evaluable", "check_angles", "check_incident", "horizon_guar
 CHUNK = 1 << 20
 #: Cosines up to this count as at or below the horizon, where the BRDF is 0.
 _HORIZON = 1e-12
+#: Azimuths beyond this many radians are brought back to one turn, as sines of large numbers are not exact in Dr.Jit.
+_MANY_TURNS = 1e3
+#: π/2 in single precision, the larger of the two numbers that stand for it.
+_RIGHT_ANGLE = float(np.float32(0.5 * math.pi))
 
 
 class Evaluable(Protocol):
@@ -49,6 +53,8 @@ def kernel_from_angles(model: Evaluable, theta_i: Any, theta_r: Any, phi: Any, v
     import drjit as dr
 
     theta_i, theta_r, visible = horizon_guard(theta_i, theta_r)
+    turns = 2.0 * math.pi * dr.round(phi * (0.5 / math.pi))
+    phi = dr.select(dr.abs(phi) > _MANY_TURNS, dr.clip(phi - turns, -math.pi, math.pi), phi)
     f = model.kernel(geometry_from_angles(theta_i, theta_r, phi), values, part)
     return [[0.0 if is_zero(x) else dr.select(visible, x, 0.0) for x in row] for row in f]
 
@@ -183,7 +189,7 @@ def check_angles(angles: dict[str, Any]) -> dict[str, np.ndarray]:
             raise ModelError(f"{name} is not a number or an array of numbers: {value!r}") from error
         bad = ~np.isfinite(array)
         if name != "phi":
-            bad |= (array < 0.0) | (array > 0.5 * math.pi)
+            bad |= (array < 0.0) | (array > _RIGHT_ANGLE)
         if bad.any():
             index = tuple(int(i[0]) for i in np.nonzero(bad)) if array.ndim else ()
             where = f" at index {index}" if array.ndim else ""
@@ -191,6 +197,8 @@ def check_angles(angles: dict[str, Any]) -> dict[str, np.ndarray]:
             worst = array[index]
             hint = "; is it in degrees?" if name != "phi" and worst > 0.5 * math.pi else ""
             raise ModelError(f"{name}={worst:g}{where} must be {rule}{hint}")
+        if name == "phi" and (many := np.abs(array) > _MANY_TURNS).any():
+            array = np.where(many, np.arctan2(np.sin(array), np.cos(array)), array)
         checked[name] = array
     return checked
 

@@ -142,36 +142,49 @@ def _averaged_specular(
     def body(k: Any, total: Any, geometry: Geometry, radius: Any, given: Any) -> tuple[Any, ...]:
         named = {**values, **dict(zip(names, given, strict=True))}
         x, y, weight = (dr.gather(F, column, k) for column in columns)
-        ray = _turned(geometry, radius * x, radius * y)
-        weight = weight * ray.cos_i / geometry.cos_i  # its share of the irradiance
+        irradiance = total[-1]
+        ray, above = _turned(geometry, radius * x, radius * y)
+        weight = dr.select(above, weight * ray.cos_i, 0.0)
         f = model.kernel(ray, named, "specular")
-        total = [dr.fma(weight, f[i][j], t) for (i, j), t in zip(used, total, strict=True)]
-        return k + 1, total, geometry, radius, given
+        total = [dr.fma(weight, f[i][j], t) for (i, j), t in zip(used, total[:-1], strict=True)]
+        return k + 1, [*total, irradiance + weight], geometry, radius, given
 
     sums = dr.while_loop(
-        (UInt(0), [dr.zeros(F, 1) for _ in used], geometry, radius, [values[name] for name in names]),
+        (
+            UInt(0),
+            [dr.zeros(F, 1) for _ in (*used, None)],
+            geometry,
+            radius,
+            [values[name] for name in names],
+        ),
         lambda k, *_: k < count,
         body,
         label="source",
         max_iterations=-1,
     )[1]
     matrix: list[list[Any]] = [[0.0] * 4 for _ in range(4)]
-    for (i, j), value in zip(used, sums, strict=True):
-        matrix[i][j] = value
+    share = dr.rcp(sums[-1])
+    for (i, j), value in zip(used, sums[:-1], strict=True):
+        matrix[i][j] = value * share
     return matrix
 
 
-def _turned(geometry: Geometry, along_p: Any, along_s: Any) -> Geometry:
-    """The geometry with the source displaced by small angles along p_i and s_i."""
+def _turned(geometry: Geometry, along_p: Any, along_s: Any) -> tuple[Geometry, Any]:
+    """The geometry with the source displaced by small angles along p_i and s_i, and whether it is above the horizon.
+
+    Where it is not, the geometry is that of the undisplaced source.
+    """
     moved = tuple(
         o + along_p * p + along_s * s
         for o, p, s in zip(geometry.omega_i, geometry.p_i, geometry.s_i, strict=True)
     )
+    above = moved[2] > 0.0
     scale = dr.rsqrt(dot(moved, moved))
-    # a source that reaches below the horizon lights nothing there; its rays are kept just above
-    omega_i = (moved[0] * scale, moved[1] * scale, dr.maximum(moved[2] * scale, 1e-3))
+    omega_i = tuple(dr.select(above, m * scale, o) for m, o in zip(moved, geometry.omega_i, strict=True))
     h = tuple(a + b for a, b in zip(omega_i, geometry.omega_r, strict=True))
-    inverse = dr.rsqrt(dot(h, h))
+    length2 = dot(h, h)
+    inverse = dr.rsqrt(length2)
     facet = tuple(c * inverse for c in h)
     sin_i = dr.sqrt(dr.maximum(1.0 - dr.square(omega_i[2]), 1e-12))
-    return geometry._replace(omega_i=omega_i, sin_i=sin_i, facet=facet, cos_beta=dot(omega_i, facet))
+    turned = geometry._replace(omega_i=omega_i, sin_i=sin_i, facet=facet, cos_beta=0.5 * length2 * inverse)
+    return turned, above

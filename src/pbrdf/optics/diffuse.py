@@ -19,9 +19,14 @@ from pbrdf.optics.powers import power
 __all__ = ["henyey_greenstein", "hot_spot", "minnaert_shape", "mrpv", "rpv"]
 
 
-def minnaert_shape(cos_i: Any, cos_r: Any, k: Any) -> Any:
-    """W = [(μ_r + μ_i) μ_r μ_i]^(k−1); the cosines must be positive."""
-    return power((cos_r + cos_i) * cos_r * cos_i, k - 1.0)
+def minnaert_shape(cos_i: Any, cos_r: Any, k: Any, scale: Any | None = None) -> Any:
+    """W = [c (μ_r + μ_i) μ_r μ_i]^(k−1); the cosines must be positive.
+
+    The factor c, ``scale``, is 1 unless given: where only ratios of W are wanted, it keeps W within the range of
+    floating-point numbers; products that it brings beyond 1e5 count as 1e5.
+    """
+    product = (cos_r + cos_i) * cos_r * cos_i
+    return power(product if scale is None else dr.minimum(product * scale, 1e5), k - 1.0)
 
 
 def mrpv(cos_i: Any, cos_r: Any, cos_scattering: Any, a: Any, k: Any, b: Any) -> Any:

@@ -51,7 +51,8 @@ def refraction_root(cos_beta: Any, n: Any, kappa: Any | None) -> tuple[Any, Any 
     imaginary = 2.0 * n * kappa
     modulus = dr.sqrt(dr.fma(real, real, imaginary * imaginary))
     # the larger of the two parts comes from the sum without cancellation, the other from their product
-    large = dr.sqrt(0.5 * (modulus + dr.abs(real)))
+    # (both are 0 where n = 1, κ = 0 and the ray grazes the facet)
+    large = dr.maximum(dr.sqrt(0.5 * (modulus + dr.abs(real))), 1e-18)
     small = 0.5 * imaginary / large
     dielectric = real >= 0.0
     return dr.select(dielectric, large, small), dr.select(dielectric, small, large)

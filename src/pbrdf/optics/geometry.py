@@ -101,7 +101,8 @@ def geometry_from_sines(
     omega_r = (sin_r * cos_phi, sin_r * sin_phi, cos_r)
     if h is None:
         h = (omega_i[0] + omega_r[0], omega_r[1], cos_i + cos_r)
-    inverse = dr.rsqrt(dot(h, h))
+    length2 = dot(h, h)
+    inverse = dr.rsqrt(length2)
     facet = (h[0] * inverse, h[1] * inverse, h[2] * inverse)
     return Geometry(
         omega_i=omega_i,
@@ -113,6 +114,8 @@ def geometry_from_sines(
         sin_i=sin_i,
         sin_r=sin_r,
         facet=facet,
-        cos_beta=dot(omega_i, facet),
+        cos_beta=0.5
+        * length2
+        * inverse,  # ω_i·facet would cancel between rays that graze from opposite sides
         cos_scattering=sin_i * sin_r * cos_phi - cos_i * cos_r,
     )

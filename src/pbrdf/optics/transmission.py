@@ -58,9 +58,11 @@ def exit_polarisation(
         Accuracy of the average over the facets.
     """
 
+    unit = _unit_of_weights(geometry, sigma)
+
     def integrand(m: Any, mu_i: Any, mu_r: Any, geometry: Geometry, args: Any) -> tuple[Any, ...]:
         n, kappa, k = args
-        W = minnaert_shape(mu_i, mu_r, k)
+        W = minnaert_shape(mu_i, mu_r, k, unit)
         mean, half = transmittances(mu_r, n, kappa, transmittance)
         q, u = tilt_rotation(m, geometry.p_r, geometry.s_r)
         half = W * half
@@ -68,10 +70,10 @@ def exit_polarisation(
 
     E_W, intensity, q, u = facet_average(integrand, 4, geometry, sigma, (n, kappa, k), accuracy)
     if normalization == "weighted":
-        scale = dr.rcp(E_W)
+        scale = _inverse(E_W)
     else:
-        solid_angle, integral = visible_means(geometry, k, accuracy)
-        scale = solid_angle / integral
+        solid_angle, integral = visible_means(geometry, k, accuracy, unit)
+        scale = solid_angle * _inverse(integral)
     return intensity * scale, q * scale, u * scale
 
 
@@ -84,16 +86,30 @@ def exit_and_entry_polarisation(
     rotations, Helmholtz reciprocity holds for the whole Mueller matrix.
     """
 
+    unit = _unit_of_weights(geometry, sigma)
+
     def integrand(m: Any, mu_i: Any, mu_r: Any, geometry: Geometry, args: Any) -> tuple[Any, ...]:
         n, kappa, k = args
-        W = minnaert_shape(mu_i, mu_r, k)
+        W = minnaert_shape(mu_i, mu_r, k, unit)
         column = _transmission_vector(m, mu_r, geometry.p_r, geometry.s_r, n, kappa)
         row = _transmission_vector(m, mu_i, geometry.p_i, geometry.s_i, n, kappa)
         return (W, *(W * out * enter for out in column for enter in row))
 
     E_W, *block = facet_average(integrand, 10, geometry, sigma, (n, kappa, k), accuracy)
-    scale = dr.rcp(E_W)
+    scale = _inverse(E_W)
     return [[block[3 * i + j] * scale for j in range(3)] for i in range(3)]
+
+
+def _unit_of_weights(geometry: Geometry, sigma: Any) -> Any:
+    """Factor on the products of local cosines after which those of most facets are near 1.
+
+    Near the horizon W would leave the range of floating-point numbers for large k. The averages do not depend on it.
+    """
+    # no facet has local cosines of a sum above 2 cosβ
+    mu_i, mu_r = (
+        dr.minimum(dr.maximum(c, 0.25 * sigma), geometry.cos_beta) for c in (geometry.cos_i, geometry.cos_r)
+    )
+    return dr.rcp(dr.detach((mu_i + mu_r) * mu_i * mu_r))
 
 
 def _transmission_vector(m: Any, mu: Any, p: Any, s: Any, n: Any, kappa: Any | None) -> tuple[Any, Any, Any]:
@@ -127,8 +143,8 @@ _VISIBLE_RULES = {
 _SERIES_TERMS = {"default": 20, "high": 32, "draft": 10, "fast": 12}
 
 
-def visible_means(geometry: Geometry, k: Any, accuracy: str = "default") -> tuple[Any, Any]:
-    """∫dω and ∫W dω over the lit and seen facets of the upper hemisphere, k > 1/3.
+def visible_means(geometry: Geometry, k: Any, accuracy: str = "default", scale: Any = 1.0) -> tuple[Any, Any]:
+    """∫dω and ∫W dω over the lit and seen facets of the upper hemisphere, k > 1/3; ``scale`` is W's factor c.
 
     The first is the spherical triangle of three half-spaces, 2π − θ_i − θ_r − 2β. For the second, take lune
     coordinates about the half vector h, m = (cosλ cosψ, cosλ sinψ, sinλ) along h, q (in the plane of the two
@@ -163,7 +179,7 @@ def visible_means(geometry: Geometry, k: Any, accuracy: str = "default") -> tupl
     whole = 2.0 * (_from_zero(half_y, a, terms) + _to_one(half_y, a, terms))
 
     def body(j: Any, total: Any, state: Any) -> tuple[Any, ...]:
-        a, k, whole, beta, cos_beta, limit, crossing, h_z, q_z, s_z2 = state
+        a, k, whole, beta, cos_beta, scale, limit, crossing, h_z, q_z, s_z2 = state
         second = j >= count
         index = dr.select(second, j - count, j)
         above, below, weight = (column(index) for column in (from_low, from_high, weights))
@@ -178,7 +194,7 @@ def visible_means(geometry: Geometry, k: Any, accuracy: str = "default") -> tupl
         # cos(ψ+β) = sin(above) and cos(ψ−β) = sin(below), by whichever distance is the smaller angle
         cos_plus = dr.sin(dr.minimum(above, below + 2.0 * beta))
         cos_minus = dr.sin(dr.minimum(below, above + 2.0 * beta))
-        product = cos_psi * cos_plus * cos_minus * 2.0 * cos_beta
+        product = cos_psi * cos_plus * cos_minus * 2.0 * cos_beta * scale
         g = dr.fma(cos_psi, h_z, sin_psi * q_z)
         y = s_z2 / dr.maximum(dr.fma(g, g, s_z2), 1e-300 if _double(F) else 1e-30)  # 1 − x0²
         near_end = y <= 0.5
@@ -190,7 +206,7 @@ def visible_means(geometry: Geometry, k: Any, accuracy: str = "default") -> tupl
         shape = dr.exp((k - 1.0) * dr.log(dr.select(valid, product, 1.0)))
         return j + 1, dr.fma(dr.select(valid, weight * half_width, 0.0), shape * inner, total), state
 
-    state = (a, k, whole, beta, cos_beta, limit, crossing, h_z, q_z, s_z2)
+    state = (a, k, whole, beta, cos_beta, scale, limit, crossing, h_z, q_z, s_z2)
     integral = dr.while_loop(
         (UInt(0), dr.zeros(F, 1), state), lambda j, *_: j < 2 * count, body, label="lune", max_iterations=-1
     )[1]
@@ -214,6 +230,11 @@ def _to_one(y: Any, a: Any, terms: int) -> Any:
     for j in reversed(range(terms)):
         total = dr.fma(y, total, coefficients[j] * dr.rcp(a + (1.0 + j)))
     return 0.5 * dr.exp((a + 1.0) * dr.log(dr.maximum(y, 1e-30))) * total
+
+
+def _inverse(weight: Any) -> Any:
+    """1/weight; not infinite where all weights are too small for floating-point numbers, as f_rpv then is, too."""
+    return dr.rcp(dr.maximum(weight, 1e-300 if _double(type(weight)) else 1e-37))
 
 
 def _double(F: Any) -> bool:
