@@ -2,7 +2,7 @@
 
     python benchmarks/domain.py [--count N] [--seed S] [--model NAME …] [--single]
 
-For every registered model Mueller matrices are evaluated (float64; with ``--single`` float32 from vectors, times cosθ_r,
+For every registered model Mueller matrices are evaluated (float64; ``--single``: float32 from vectors, times cosθ_r,
 as the renderer does) for random directions and parameters, each of its own: parameters over the whole range that a
 model takes, their ends included (where that range is open, and with ``--single``, the fit's bounds), directions also
 within 1e-12 of the normal, the horizon, the mirror direction and backscatter, and azimuths of many turns. Counted are
