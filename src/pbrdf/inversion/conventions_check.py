@@ -1,37 +1,64 @@
 """Whether the data contradict the conventions that they were read by.
 
-A file that does not say where φ = 0 lies, what Q > 0 means, whether its values carry the cosine of the viewing angle or
-are per cent is read by an assumption, and one that says may be wrong. Each reading is one change of the data; the same
-model fitted to the changed data tells by its χ² whether they make more sense that way.
+A file that does not say where φ = 0 lies, what Q > 0 means, which of its angles is whose, whether its values carry a
+cosine or are per cent is read by an assumption, and one that says may be wrong. Each reading is one change of the data;
+the same model fitted to the changed data tells by its χ² whether they make more sense that way.
 """
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from pbrdf.data import conventions
 from pbrdf.data.schema import COVARIANCE
+from pbrdf.inversion.plausibility import Finding, Severity
 from pbrdf.inversion.result import FitResult
-from pbrdf.inversion.suggestions import TIME
 from pbrdf.inversion.trials import Clock, Suggestion, some_of, trial, trial_arguments
 from pbrdf.inversion.verdict import Level
+from pbrdf.optics.stokes import STOKES
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["contradicted_conventions", "readings"]
+__all__ = ["contradicted_conventions", "misfit", "readings"]
 
+#: A reduced χ² above this is large, where the uncertainties are stated.
+LARGE = 3.0
 #: χ² falls to this share or less where the data contradict a convention …
 CONTRADICTED = 0.5
 #: … and the verdict becomes a better one, or χ² falls to this share.
 PLAINLY = 0.1
+#: Time for all trials, seconds.
+TIME = 10.0
+#: A reading that leaves this share of χ², by which the model describes the data, is the right one: no more are tried.
+_FOUND = 0.02
+#: Geometries of a trial at most, and its starts: another reading has its optimum elsewhere.
+_GEOMETRIES, _STARTS = 120, 8
+#: Zenith angles below this many radians, all of them, may be degrees of radians.
+_SMALL = math.radians(math.pi)
 _BETTER = {Level.DOES_NOT: 0, Level.IN_PART: 1, Level.DESCRIBES: 2}
+_Change = Callable[["xr.Dataset"], "xr.Dataset"]
+#: Whether the convention was stated, the option, words after "the data fit better", the change.
+_Reading = tuple[bool, str, str, _Change]
 _RADIOMETRIC = ("I", "Q", "U", "V", "mueller")
+
+
+def misfit(result: FitResult, findings: Sequence[Finding]) -> bool:
+    """Whether something is wrong enough with a fit to doubt how its data were read.
+
+    The model does not describe them, or reflects more than it receives, or χ² is far above what the stated
+    uncertainties allow.
+    """
+    return (
+        result.verdict().level != Level.DESCRIBES
+        or any(finding.severity == Severity.VIOLATION for finding in findings)
+        or (result.data.std_known and result.goodness.reduced_chi2 > LARGE)
+    )
 
 
 def contradicted_conventions(
@@ -50,7 +77,7 @@ def contradicted_conventions(
     fit_arguments
         Arguments of that fit, as for :func:`pbrdf.fit`.
     until
-        When to stop, by :func:`time.monotonic`; None stops after :data:`~pbrdf.inversion.suggestions.TIME` seconds.
+        When to stop, by :func:`time.monotonic`; None stops after :data:`TIME` seconds.
 
     Returns
     -------
@@ -58,9 +85,9 @@ def contradicted_conventions(
         The reading of the least χ² first; empty where none is contradicted.
     """
     clock = Clock(time.monotonic() + TIME if until is None else until)
-    used = some_of(dataset)
+    used = some_of(dataset, most=_GEOMETRIES)
     some = dataset.isel(geometry=used)
-    arguments = trial_arguments(result, fit_arguments, used)
+    arguments = {**trial_arguments(result, fit_arguments, used), "starts": _STARTS}
     before = trial(some, clock, **arguments)
     if before is None:
         return []
@@ -75,6 +102,8 @@ def contradicted_conventions(
         better = _BETTER[after.verdict().level] > _BETTER[before.verdict().level]
         if share <= CONTRADICTED and (better or share <= PLAINLY):
             found.append(_suggestion(option, words, before, after))
+        if share <= _FOUND and after.verdict().level == Level.DESCRIBES:
+            break
     return sorted(found, key=lambda s: s.chi2_after)
 
 
@@ -88,13 +117,13 @@ def _suggestion(option: str, words: str, before: FitResult, after: FitResult) ->
     return Suggestion(option, errors[0], errors[1], chi2[0], chi2[1], sentence)
 
 
-def readings(dataset: xr.Dataset) -> Iterator[tuple[str, str, Callable[[xr.Dataset], xr.Dataset]]]:
+def readings(dataset: xr.Dataset) -> Iterator[tuple[str, str, _Change]]:
     """Other readings that make a difference to these data: option, words after "the data fit better", change.
 
     Those of conventions that were assumed come first.
     """
     assumed = " ".join(dataset.attrs.get("assumptions", ()))
-    found = []
+    found: list[_Reading] = []
     if (dataset["theta_r"].values > 0.0).any():
         stated = "azimuth" not in assumed and "phi = 0" not in assumed
         option = "theta_r of the other sign" if "no azimuth" in assumed else "--azimuth forward=180"
@@ -104,15 +133,45 @@ def readings(dataset: xr.Dataset) -> Iterator[tuple[str, str, Callable[[xr.Datas
         stated = "Q > 0" not in assumed
         option = "--stokes s-p" + (" (or p-s if that was stated)" if stated else "")
         found.append((stated, option, "with Q and U of the other sign", _stokes))
+    if "Q" in dataset and "U" in dataset:
+        option = "the columns of Q and U exchanged (--column Q=… --column U=…)"
+        found.append((True, option, "with Q and U exchanged", _exchanged("Q", "U")))
+        option = "the sign of U or of phi changed in the file"
+        found.append((True, option, "with the azimuth counted the other way", _mirrored))
+        if COVARIANCE not in dataset:
+            option = "the columns of Q and U as Q/I and U/I"
+            found.append((True, option, "with Q and U taken as Q/I and U/I", _normalised))
+    theta_i, theta_r = dataset["theta_i"].values, dataset["theta_r"].values
+    if max(theta_i.max(), theta_r.max()) < _SMALL:
+        found.append((False, "--angles radians", "with angles in radians", _in_radians))
+    option = "the columns of both angles exchanged (--column theta_i=… --column theta_r=…)"
+    found.append((True, option, "with θ_i and θ_r exchanged", _exchanged("theta_i", "theta_r")))
+    for names in (("theta_r",), ("theta_i",), ("theta_i", "theta_r")):
+        if all((dataset[name].values > 0.0).all() for name in names):
+            whose = " and ".join(names)
+            option = f"{whose} as 90° minus the elevation in the file"
+            found.append((True, option, f"with {whose} taken as elevation", _elevation(names)))
     if "I" in dataset or "mueller" in dataset:
         found.append((True, "--cosine-weighted", "divided by cos θ_r", _divided_by_cosine))
         found.append((True, "--not-cosine-weighted", "multiplied by cos θ_r", _multiplied_by_cosine))
+        if dataset.attrs.get("scale") != "arbitrary":
+            found += _scales(dataset.attrs.get("quantity"))
     if "dolp" in dataset and float(np.nanmax(dataset["dolp"].values, initial=0.0)) > 0.0:
         found.append((True, "DoLP divided by 100", "with DoLP taken as per cent", _dolp_in_percent))
-    if dataset.attrs.get("quantity") == "reflectance_factor" and dataset.attrs.get("scale") != "arbitrary":
-        found.append((True, "values divided by 100", "taken as per cent", _values_in_percent))
     for _, option, words, change in sorted(found, key=lambda item: item[0]):
         yield option, words, change
+
+
+def _scales(quantity: str | None) -> Iterator[_Reading]:
+    """Readings of another quantity or unit, where the scale of the values means something."""
+    if quantity in ("brdf", "reflectance_factor"):
+        yield True, "values divided by 100", "taken as per cent", _times(0.01)
+        yield True, "--quantity radiance", "divided by cos θ_i", _divided_by_source_cosine
+    if quantity == "brdf":
+        yield True, "--quantity reflectance_factor", "divided by π", _times(1.0 / math.pi)
+        yield True, "values multiplied by π", "multiplied by π", _times(math.pi)
+    if quantity == "reflectance_factor":
+        yield True, "--quantity brdf", "multiplied by π", _times(math.pi)
 
 
 def _azimuth(dataset: xr.Dataset) -> xr.Dataset:
@@ -158,8 +217,57 @@ def _multiplied_by_cosine(dataset: xr.Dataset) -> xr.Dataset:
     return _scaled(dataset, np.cos(dataset["theta_r"].values))
 
 
-def _values_in_percent(dataset: xr.Dataset) -> xr.Dataset:
-    return _scaled(dataset, np.full(dataset.sizes["geometry"], 0.01))
+def _divided_by_source_cosine(dataset: xr.Dataset) -> xr.Dataset:
+    return _scaled(dataset, 1.0 / np.cos(dataset["theta_i"].values))
+
+
+def _times(factor: float) -> _Change:
+    return lambda dataset: _scaled(dataset, np.full(dataset.sizes["geometry"], factor))
+
+
+def _exchanged(first: str, second: str) -> _Change:
+    """Two variables exchanged, their uncertainties with them."""
+
+    def change(dataset: xr.Dataset) -> xr.Dataset:
+        changed = dataset.copy()
+        for suffix in ("", "_std"):
+            a, b = first + suffix, second + suffix
+            if a in dataset.variables and b in dataset.variables:
+                changed[a], changed[b] = dataset[b].copy(), dataset[a].copy()
+        if COVARIANCE in changed and first in STOKES:
+            order = [{first: second, second: first}.get(name, name) for name in STOKES]
+            index = [STOKES.index(name) for name in order]
+            values = changed[COVARIANCE].values[:, index][:, :, index]
+            changed[COVARIANCE] = (changed[COVARIANCE].dims, values)
+        return changed
+
+    return change
+
+
+def _mirrored(dataset: xr.Dataset) -> xr.Dataset:
+    return dataset.assign_coords(phi=("geometry", -dataset["phi"].values, dataset["phi"].attrs))
+
+
+def _normalised(dataset: xr.Dataset) -> xr.Dataset:
+    changed = dataset.copy()
+    for name in ("Q", "U", "Q_std", "U_std"):
+        if name in dataset:
+            changed[name] = dataset[name] * dataset["I"]
+    return changed
+
+
+def _in_radians(dataset: xr.Dataset) -> xr.Dataset:
+    return dataset.assign_coords(
+        {name: ("geometry", np.rad2deg(dataset[name].values)) for name in ("theta_i", "theta_r", "phi")}
+    )
+
+
+def _elevation(names: Sequence[str]) -> _Change:
+    def change(dataset: xr.Dataset) -> xr.Dataset:
+        turned = {name: ("geometry", 0.5 * math.pi - dataset[name].values) for name in names}
+        return dataset.assign_coords(turned)
+
+    return change
 
 
 def _dolp_in_percent(dataset: xr.Dataset) -> xr.Dataset:

@@ -68,12 +68,12 @@ class Clock:
         self._spent.append(time.monotonic() - start)
 
 
-def some_of(dataset: xr.Dataset, seed: int = 0) -> np.ndarray:
+def some_of(dataset: xr.Dataset, seed: int = 0, most: int = GEOMETRIES) -> np.ndarray:
     """Geometries of a trial, drawn by chance, ascending: no stride that could fall in step with a grid."""
     size = dataset.sizes["geometry"]
-    if size <= GEOMETRIES:
+    if size <= most:
         return np.arange(size)
-    return np.sort(np.random.default_rng(seed).choice(size, GEOMETRIES, replace=False))
+    return np.sort(np.random.default_rng(seed).choice(size, most, replace=False))
 
 
 def trial_hold_out(result: FitResult, dataset: xr.Dataset) -> HoldOut | None:

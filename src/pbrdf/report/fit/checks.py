@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from pbrdf.inversion.conventions_check import contradicted_conventions
-from pbrdf.inversion.suggestions import TIME, Suggestion, suggestions
+from pbrdf.inversion.conventions_check import contradicted_conventions, misfit
+from pbrdf.inversion.suggestions import Suggestion, suggestions
 from pbrdf.inversion.verdict import Level
 from pbrdf.report.numbers import shown_unit
 
@@ -25,9 +24,6 @@ if TYPE_CHECKING:
     from pbrdf.inversion.result import FitResult
 
 __all__ = ["Checks", "run_checks"]
-
-#: Share of the time for trials that may go to other readings of the data.
-_FOR_CONVENTIONS = 0.5
 
 
 @dataclass(frozen=True)
@@ -161,16 +157,13 @@ def run_checks(
         folds = run_folds(dataset, by=cross_validate, **(fit_arguments or {}))
     conventions: list[Suggestion] = []
     advice: list[Suggestion] = []
-    if suggest and result.verdict().level != Level.DESCRIBES:
-        now = time.monotonic()
-        until = now + TIME
-        conventions = contradicted_conventions(
-            dataset, result, fit_arguments or {}, until=now + _FOR_CONVENTIONS * TIME
-        )
-        if not conventions:
-            advice = suggestions(dataset, result, fit_arguments or {}, until=until)
+    findings = result.plausibility(dataset)
+    if suggest and misfit(result, findings):
+        conventions = contradicted_conventions(dataset, result, fit_arguments or {})
+        if not conventions and result.verdict().level != Level.DESCRIBES:
+            advice = suggestions(dataset, result, fit_arguments or {})
     return Checks(
-        plausibility=result.plausibility(dataset),
+        plausibility=findings,
         identifiability=result.identifiability(),
         errors=result.error_analysis(),
         profile=result.profile() if profile else None,
