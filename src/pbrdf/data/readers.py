@@ -42,6 +42,9 @@ _OWN = {
     "cornell": "pbrdf.data.formats.cornell",
     "pbsdf": "pbrdf.data.formats.pbsdf",
     "merl": "pbrdf.data.formats.merl",
+    "zemax": "pbrdf.data.formats.zemax",
+    "fred": "pbrdf.data.formats.fred",
+    "speos": "pbrdf.data.formats.speos",
 }
 _registered: dict[str, Reader] = {}
 
