@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 __all__ = [
     "GROUP",
     "format_names",
+    "format_of",
     "read",
     "register_reader",
     "write",
@@ -45,6 +46,8 @@ _OWN = {
     "zemax": "pbrdf.data.formats.zemax",
     "fred": "pbrdf.data.formats.fred",
     "speos": "pbrdf.data.formats.speos",
+    "openmaterial": "pbrdf.data.formats.openmaterial",
+    "matlab": "pbrdf.data.formats.matlab",
 }
 _registered: dict[str, Reader] = {}
 
@@ -72,6 +75,15 @@ def format_names() -> list[str]:
     """Names of all formats."""
     installed = (entry.name for entry in importlib.metadata.entry_points(group=GROUP))
     return list(dict.fromkeys((*_OWN, *_registered, *installed)))
+
+
+def format_of(path: str | Path) -> str | None:
+    """Name of the format that a file, or a folder, has by its content or its extension; None if it has none."""
+    path = Path(path)
+    return next(
+        (reader.name for reader in _readers() if _sniffs(reader, path)),
+        next((reader.name for reader in _readers() if path.suffix.lower() in reader.extensions), None),
+    )
 
 
 def written_extensions() -> list[str]:

@@ -44,6 +44,7 @@ __all__ = [
     "READER",
     "SIMULATED",
     "PolarizedTable",
+    "dataset_from_table",
     "mueller_from_pbsdf",
     "mueller_to_pbsdf",
     "read_pbsdf",
@@ -230,7 +231,17 @@ def read_pbsdf(
         As :func:`read_table`; if nothing is left of the table, or a wavelength is not in it.
     """
     path = Path(path)
-    table = read_table(path)
+    return dataset_from_table(read_table(path), path, wavelength=wavelength, every=every)
+
+
+def dataset_from_table(
+    table: PolarizedTable,
+    path: Path,
+    *,
+    wavelength: float | Sequence[float] | None = None,
+    every: int | None = None,
+) -> xr.Dataset:
+    """The data set of :func:`read_pbsdf` from a table that was read from `path`."""
     available = table.wavelength.astype(np.float64)
     chosen = match_wavelengths(available, wavelength, str(path))
     step = thinning(table.matrices.shape[:3], every, str(path))
@@ -267,4 +278,4 @@ def read_pbsdf(
     return ds
 
 
-READER = Reader("pbsdf", read_pbsdf, extensions=(".pbsdf",), sniff=is_tensor_file)
+READER = Reader("pbsdf", read_pbsdf, extensions=(".pbsdf", ".hpbrdf"), sniff=is_tensor_file)

@@ -30,7 +30,7 @@ def scalar_rows(
     path: Path,
     coordinates: Mapping[str, ArrayLike | None],
     values: ArrayLike,
-    lines: Sequence[int] | NDArray[np.int64],
+    lines: Sequence[int] | NDArray[np.int64] | None,
     *,
     grid: bool = False,
     attrs: Mapping[str, Any] | None = None,
@@ -47,7 +47,7 @@ def scalar_rows(
     values
         BRDF, 1/sr, shape (N,); NaN was not measured, and is left out.
     lines
-        Of the file, one for each row.
+        Of the file, one for each row; None if it has none, and messages count rows.
     grid
         Whether the rows are the cells of a grid of angles: those below the horizon, and those that hold 0, are left
         out then, the latter with a sentence. Else a direction below the horizon is an error.
@@ -93,7 +93,7 @@ def scalar_rows(
             **extra,
         },
     )
-    validate(ds, origin=str(path), lines=np.asarray(lines)[keep].tolist())
+    validate(ds, origin=str(path), lines=None if lines is None else np.asarray(lines)[keep].tolist())
     return ds
 
 
