@@ -48,6 +48,8 @@ _OWN = {
     "speos": "pbrdf.data.formats.speos",
     "openmaterial": "pbrdf.data.formats.openmaterial",
     "matlab": "pbrdf.data.formats.matlab",
+    "alta": "pbrdf.data.formats.alta",
+    "astm": "pbrdf.data.formats.astm",
 }
 _registered: dict[str, Reader] = {}
 

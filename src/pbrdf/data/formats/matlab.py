@@ -62,10 +62,10 @@ def read_matlab(
     name = next((table for table in _TABLES if table in shapes), None)
     missing = [axis for axis in _AXES if axis not in shapes]
     if name is None or missing:
+        lacking = missing[0] if missing else " or ".join(_TABLES)
         raise DataError(
-            f"{path}: there is no variable {missing[0] if missing else ' or '.join(_TABLES)}; a table of Mueller matrices "
-            f"has {', '.join(_AXES)} and {_TABLES[0]}, but this file holds {', '.join(shapes) or 'nothing'}. Save other "
-            "data as CSV"
+            f"{path}: there is no variable {lacking}; a table of Mueller matrices has {', '.join(_AXES)} and "
+            f"{_TABLES[0]}, but this file holds {', '.join(shapes) or 'nothing'}. Save other data as CSV"
         )
     counts = tuple(math.prod(shapes[axis]) for axis in _AXES)
     if shapes[name] != (*counts, 4, 4):

@@ -1,13 +1,13 @@
 """BRDF look-up tables of ASAM OpenMATERIAL 3D (``.xompt``).
 
-JSON: ``metadata`` with ``name``, ``sources`` and more, and ``brdf`` with ``wavelengths`` and ``lookupTable``, rows of five
-numbers: wavelength in **metres**, zenith angles of incidence and exit, azimuth of the exit, all in **radians**, and the
-BRDF in 1/sr; null where there is none. Source: ``material_brdf_schema.json`` of asam-ev/OpenMATERIAL-3D.
+JSON: ``metadata`` with ``name``, ``sources`` and more, and ``brdf`` with ``wavelengths`` and ``lookupTable``, rows of
+five numbers: wavelength in **metres**, zenith angles of incidence and exit, azimuth of the exit, all in **radians**,
+and the BRDF in 1/sr; null where there is none. Source: ``material_brdf_schema.json`` of asam-ev/OpenMATERIAL-3D.
 
 The exit's azimuth is "relative to the incident azimuth angle", which is 0 "because the incident ray is used as the
 reference" (issue 436). Both are those of directions on the hemisphere over the surface: azimuth 0 is back towards the
-source and π the specular half-plane, as in the usual definition of a BRDF by two directions, which that issue agrees to
-keep. The reader moves forward from π to 0; for files by another reading there is the option `azimuth`.
+source and π the specular half-plane, as in the usual definition of a BRDF by two directions, which that issue agrees
+to keep. The reader moves forward from π to 0; for files by another reading there is the option `azimuth`.
 """
 
 from __future__ import annotations
@@ -95,7 +95,7 @@ def read_openmaterial(
     chosen = np.isin(nanometres, available[match_wavelengths(available, wavelength, str(path))])
     forward_is_pi = _FORWARD[azimuth or "forward=180"]
     sources = str(metadata.get("sources", ""))
-    ds = scalar_rows(
+    return scalar_rows(
         path,
         {
             "theta_i": theta_i[chosen],
@@ -113,7 +113,6 @@ def read_openmaterial(
             "simulated": int("simulat" in sources.lower()),
         },
     )
-    return ds
 
 
 def _json(path: Path) -> Mapping[str, Any]:
