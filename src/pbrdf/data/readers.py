@@ -41,6 +41,7 @@ _OWN = {
     "zarr": "pbrdf.data.formats.zarr_folder",
     "scatmech": "pbrdf.data.formats.scatmech",
     "cornell": "pbrdf.data.formats.cornell",
+    "rgl": "pbrdf.data.formats.rgl",
     "pbsdf": "pbrdf.data.formats.pbsdf",
     "merl": "pbrdf.data.formats.merl",
     "zemax": "pbrdf.data.formats.zemax",
