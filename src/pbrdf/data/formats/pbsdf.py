@@ -17,6 +17,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -93,20 +94,20 @@ class PolarizedTable:
     Attributes
     ----------
     theta_h, theta_d, phi_d
-        Nodes in radians, float32, ascending; shapes (Nh,), (Nd,) and (Np,).
+        Nodes in radians, ascending, float32 in a file; shapes (Nh,), (Nd,) and (Np,).
     wavelength
         In nm, whole numbers, shape (Nw,).
     matrices
-        float32, shape (Np, Nd, Nh, Nw, 4, 4), in the convention of the file, 1/sr.
+        Shape (Np, Nd, Nh, Nw, 4, 4), float32 in a file, in the convention of the file, 1/sr.
     description
         Where the table comes from; begins with :data:`SIMULATED` if a model produced it.
     """
 
-    theta_h: NDArray[np.float32]
-    theta_d: NDArray[np.float32]
-    phi_d: NDArray[np.float32]
-    wavelength: NDArray[np.uint16]
-    matrices: NDArray[np.float32]
+    theta_h: NDArray[np.floating[Any]]
+    theta_d: NDArray[np.floating[Any]]
+    phi_d: NDArray[np.floating[Any]]
+    wavelength: NDArray[Any]
+    matrices: NDArray[np.floating[Any]]
     description: str = ""
 
     def mueller(
