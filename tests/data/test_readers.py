@@ -333,3 +333,9 @@ def test_a_broken_reader_is_named_and_does_not_stop_the_others(package, text_fil
 @pytest.mark.parametrize(("name", "format"), [("t.csv", "csv"), ("t.pbsdf", "pbsdf"), ("t.xyz", None)])
 def test_the_format_of_a_file_is_told_without_reading_it(text_file, name, format):
     assert readers.format_of(text_file("anything", name)) == format
+
+
+def test_a_format_of_ours_is_known_under_the_extension_of_another(text_file):
+    """A FRED table saved as .tsv, which is a table's extension, is still one."""
+    path = text_file("type bsdf_data\nformat angles=deg bsdf=value scale=1\n10 0\n10 0 0.5\n", "paint.tsv")
+    assert read(path).sizes["geometry"] == 1
