@@ -5,21 +5,24 @@ The files of S.-H. Baek et al. (:mod:`pbrdf.data.formats.pbsdf` has the same tab
 wavelength, 4, 4), in the order of axes that Kyunnilee/pBRDF-visualization, enomotokenji/pbrdf-rendering and the
 ``M`` of the ``.pbsdf`` files agree on; so are frames and signs. Angles are in radians, or in degrees where they are
 larger than radians can be; wavelengths in nm. NaN cells were not measured. Both kinds of file are read: up to version 7
-(by SciPy), and version 7.3, which is HDF5 with the axes in reverse.
+(:mod:`pbrdf.data.formats.mat5`), and version 7.3, which is HDF5 with the axes in reverse.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
 from pbrdf.data.formats.declaration import Reader
+from pbrdf.data.formats.mat5 import mat5_arrays
 from pbrdf.data.formats.pbsdf import PolarizedTable, dataset_from_table
 from pbrdf.errors import DataError
 from pbrdf.files.text import first_bytes
@@ -109,46 +112,34 @@ def _is_hdf5(path: Path) -> bool:
 
 
 def _shapes(path: Path) -> dict[str, tuple[int, ...]]:
-    """Shape of each numeric variable, by name; nothing of it is loaded."""
+    """Shape of each array, by name; nothing of it is loaded."""
     if not _is_hdf5(path):
-        return {name: shape for name, shape, _ in _guarded(path, lambda scipy_io: scipy_io.whosmat(path))}
-    import h5py
-
-    def shapes(_: Any) -> dict[str, tuple[int, ...]]:
-        with h5py.File(path) as file:
-            return {k: tuple(reversed(v.shape)) for k, v in file.items() if isinstance(v, h5py.Dataset)}
-
-    return _guarded(path, shapes)
+        return {array.name: array.shape for array in mat5_arrays(path)}
+    with _opened(path) as file:
+        return {k: tuple(reversed(v.shape)) for k, v in file.items() if isinstance(v, h5py.Dataset)}
 
 
 def _variables(path: Path, names: list[str]) -> dict[str, NDArray[Any]]:
     if not _is_hdf5(path):
-        values = _guarded(path, lambda scipy_io: scipy_io.loadmat(path, variable_names=names))
-    else:
-        import h5py
-
-        def load(_: Any) -> dict[str, NDArray[Any]]:
-            with h5py.File(path) as file:
-                return {name: np.asarray(file[name][()]).T for name in names}
-
-        values = _guarded(path, load)
-    for name in names:
-        if not isinstance(values.get(name), np.ndarray) or values[name].dtype.kind not in "iuf":
+        return {array.name: array.load() for array in mat5_arrays(path) if array.name in names}
+    with _opened(path) as file:
+        values = {name: np.asarray(file[name][()]).T for name in names}
+    for name, array in values.items():
+        if array.dtype.kind not in "iuf":
             raise DataError(f"{path}: the variable {name} does not hold real numbers")
     return values
 
 
-def _guarded(path: Path, function: Any) -> Any:
-    """What a function of :mod:`scipy.io` gives; its many errors at damaged files as one."""
-    import scipy.io
-
+@contextmanager
+def _opened(path: Path) -> Iterator[h5py.File]:
+    """An HDF5 file; what goes wrong with it is a DataError."""
     try:
-        return function(scipy.io)
+        with h5py.File(path) as file:
+            yield file
+    except (OSError, KeyError, RuntimeError, ValueError, TypeError) as error:
+        raise DataError(f"{path}: cannot be read as a MATLAB file: {' '.join(str(error).split())}") from error
     except MemoryError as error:
         raise DataError(f"{path}: there is not enough memory for what this file declares") from error
-    except Exception as error:
-        told = " ".join(str(error).split())
-        raise DataError(f"{path}: cannot be read as a MATLAB file: {told or type(error).__name__}") from error
 
 
 def _begins_as_matlab(path: Path) -> bool:
