@@ -91,7 +91,22 @@ def test_other_contents_are_refused(tmp_path, change, words):
     path = tmp_path / "paint.mat"
     scipy.io.savemat(path, {k: v for k, v in (arrays() | change).items() if v is not None})
     with pytest.raises(DataError, match=words):
-        read(path)
+        read(path, format="matlab")
+
+
+def test_vectors_are_the_columns_of_a_table(tmp_path):
+    """Other MATLAB files: a column for each vector, a constant for each number, with the options of tables."""
+    path = tmp_path / "scan.mat"
+    scipy.io.savemat(
+        path, {"theta_i": 30.0, "theta_r": [[10.0], [-20.0]], "brdf": [0.25, 0.5], "phi": [0, 0]}
+    )
+    ds = read(path)
+    assert_allclose(np.rad2deg(ds["theta_i"]), [30, 30])
+    assert_allclose(ds["I"], [0.25, 0.5])
+    assert ds.attrs["quantity"] == "brdf"
+    assert_allclose(
+        read(path, angles="radians", column={"theta_i": "=0.5", "theta_r": "=0.2"})["theta_i"], 0.5
+    )
 
 
 @pytest.mark.parametrize("keep", [20, 130, 400, 0.5])

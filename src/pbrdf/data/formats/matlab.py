@@ -5,27 +5,24 @@ The files of S.-H. Baek et al. (:mod:`pbrdf.data.formats.pbsdf` has the same tab
 wavelength, 4, 4), in the order of axes that Kyunnilee/pBRDF-visualization, enomotokenji/pbrdf-rendering and the
 ``M`` of the ``.pbsdf`` files agree on; so are frames and signs. Angles are in radians, or in degrees where they are
 larger than radians can be; wavelengths in nm. NaN cells were not measured. Both kinds of file are read: up to version 7
-(:mod:`pbrdf.data.formats.mat5`), and version 7.3, which is HDF5 with the axes in reverse.
+(:mod:`pbrdf.files.mat5`), and version 7.3. Other MATLAB files are tables (:mod:`pbrdf.files.matlab`).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
 from pbrdf.data.formats.declaration import Reader
-from pbrdf.data.formats.mat5 import mat5_arrays
 from pbrdf.data.formats.pbsdf import PolarizedTable, dataset_from_table
 from pbrdf.errors import DataError
-from pbrdf.files.text import first_bytes
+from pbrdf.files.matlab import is_matlab, matlab_arrays
 
 __all__ = ["READER", "read_matlab"]
 
@@ -61,14 +58,15 @@ def read_matlab(
         If the file cannot be read, or holds no such table; names the variables that it holds.
     """
     path = Path(path)
-    shapes = _shapes(path)
+    arrays = {array.name: array for array in matlab_arrays(path)}
+    shapes = {name: array.shape for name, array in arrays.items()}
     name = next((table for table in _TABLES if table in shapes), None)
     missing = [axis for axis in _AXES if axis not in shapes]
     if name is None or missing:
         lacking = missing[0] if missing else " or ".join(_TABLES)
         raise DataError(
             f"{path}: there is no variable {lacking}; a table of Mueller matrices has {', '.join(_AXES)} and "
-            f"{_TABLES[0]}, but this file holds {', '.join(shapes) or 'nothing'}. Save other data as CSV"
+            f"{_TABLES[0]}, but this file holds {', '.join(shapes) or 'nothing'}"
         )
     counts = tuple(math.prod(shapes[axis]) for axis in _AXES)
     if shapes[name] != (*counts, 4, 4):
@@ -80,7 +78,7 @@ def read_matlab(
         raise DataError(
             f"{path}: {name} cannot have the shape {shapes[name]} in a file of this size: it is damaged"
         )
-    values = _variables(path, [*_AXES, name])
+    values: dict[str, NDArray[Any]] = {key: arrays[key].load() for key in (*_AXES, name)}
     axes = {axis: values[axis].ravel().astype(np.float64) for axis in _AXES}
     if max(axes["theta_h"].max(), axes["theta_d"].max()) > np.pi / 2 + 0.01:
         axes |= {axis: np.deg2rad(axes[axis]) for axis in _AXES[:3]}
@@ -107,43 +105,13 @@ def _require_nodes(path: Path, axes: dict[str, NDArray[np.float64]]) -> None:
             )
 
 
-def _is_hdf5(path: Path) -> bool:
-    return first_bytes(path, 12).startswith(b"MATLAB 7.3") or first_bytes(path, 8) == b"\x89HDF\r\n\x1a\n"
-
-
-def _shapes(path: Path) -> dict[str, tuple[int, ...]]:
-    """Shape of each array, by name; nothing of it is loaded."""
-    if not _is_hdf5(path):
-        return {array.name: array.shape for array in mat5_arrays(path)}
-    with _opened(path) as file:
-        return {k: tuple(reversed(v.shape)) for k, v in file.items() if isinstance(v, h5py.Dataset)}
-
-
-def _variables(path: Path, names: list[str]) -> dict[str, NDArray[Any]]:
-    if not _is_hdf5(path):
-        return {array.name: array.load() for array in mat5_arrays(path) if array.name in names}
-    with _opened(path) as file:
-        values = {name: np.asarray(file[name][()]).T for name in names}
-    for name, array in values.items():
-        if array.dtype.kind not in "iuf":
-            raise DataError(f"{path}: the variable {name} does not hold real numbers")
-    return values
-
-
-@contextmanager
-def _opened(path: Path) -> Iterator[h5py.File]:
-    """An HDF5 file; what goes wrong with it is a DataError."""
+def _holds_a_table(path: Path) -> bool:
+    if not is_matlab(path):
+        return False
     try:
-        with h5py.File(path) as file:
-            yield file
-    except (OSError, KeyError, RuntimeError, ValueError, TypeError) as error:
-        raise DataError(f"{path}: cannot be read as a MATLAB file: {' '.join(str(error).split())}") from error
-    except MemoryError as error:
-        raise DataError(f"{path}: there is not enough memory for what this file declares") from error
+        return any(array.name in _TABLES for array in matlab_arrays(path))
+    except DataError:
+        return True  # it is ours to say what is wrong
 
 
-def _begins_as_matlab(path: Path) -> bool:
-    return first_bytes(path, 7) == b"MATLAB "
-
-
-READER = Reader("matlab", read_matlab, extensions=(".mat",), sniff=_begins_as_matlab)
+READER = Reader("matlab", read_matlab, extensions=(".mat",), sniff=_holds_a_table)

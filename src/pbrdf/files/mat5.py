@@ -75,7 +75,7 @@ class Mat5Array:
             kind, size, begin = _tag(data[self._numbers :], self._order, self.path)
             if kind not in _NUMBERS:
                 raise _damaged(self.path, f"the numbers of {self.name} have the type {kind}")
-            dtype = np.dtype(_NUMBERS[kind]).newbyteorder(self._order)
+            dtype = np.dtype(f"{self._order}{_NUMBERS[kind]}")
             if size != count * dtype.itemsize:
                 raise _damaged(
                     self.path, f"{self.name} has {size} bytes of numbers for the shape {self.shape}"

@@ -9,8 +9,8 @@ import pytest
 import scipy.io
 from numpy.testing import assert_array_equal
 
-from pbrdf.data.formats.mat5 import mat5_arrays
 from pbrdf.errors import DataError
+from pbrdf.files.mat5 import mat5_arrays
 
 CONTENT = {
     "a": np.arange(24.0).reshape(2, 3, 4),
