@@ -49,6 +49,7 @@ _OWN = {
     "speos": "pbrdf.data.formats.speos",
     "openmaterial": "pbrdf.data.formats.openmaterial",
     "matlab": "pbrdf.data.formats.matlab",
+    "lighttools": "pbrdf.data.formats.lighttools",
     "alta": "pbrdf.data.formats.alta",
     "astm": "pbrdf.data.formats.astm",
 }

@@ -88,6 +88,32 @@ def test_header_facts_are_used(text_file):
     assert "wavelength" not in read(text_file(SMALL.replace("#Wave", "#"), "b.bsdf")).coords
 
 
+@pytest.mark.parametrize(
+    ("comment", "nanometres"),
+    [
+        ("# Light source: red laser (650 nm, 3.5mm spot diam.)", 650),
+        ("# wavelength: 1.55 um", 1550),
+        ("# laser lines between 450 nm and 650 nm", None),
+        ("# a coating of 300 nm", None),
+        ("# sample 7 of 2008", None),
+    ],
+)
+def test_the_one_wavelength_that_comments_name_is_it(text_file, comment, nanometres):
+    ds = read(text_file(SMALL.replace("#Wavelength (nm) = 550", comment), "a.bsdf"))
+    assert ds.attrs["title"] == f"Made by hand; {comment.removeprefix('# ')}"
+    if nanometres is None:
+        assert "wavelength" not in ds.coords
+    else:
+        assert_allclose(ds["wavelength"], nanometres)
+
+
+def test_long_comments_are_cut_for_the_title(text_file):
+    lines = "# ======\n" + "".join(f"# remark number {k}\n" for k in range(100))
+    title = read(text_file(lines + SMALL, "a.bsdf")).attrs["title"]
+    assert title.startswith("remark number 0; remark number 1;")
+    assert len(title) == 200
+
+
 def test_the_content_tells_the_format(text_file):
     for name in ("paint.txt", "paint.dat", "paint.unknown"):
         assert read(text_file(SMALL.upper() if name == "paint.dat" else SMALL, name)).sizes["geometry"] == 12

@@ -13,7 +13,8 @@ towards the normal, and grows anticlockwise as seen against the rays. So radial 
 leads towards the normal (and past it to the side of the source), azimuth 180 away from it to the horizon. The angles
 are those on the sphere, not differences of direction cosines.
 
-The format knows no wavelength; a comment ``Wavelength (nm) = 550``, as converters write it, is read.
+The format knows no wavelength; where the comments name one, as converters (``Wavelength (nm) = 550``) and laboratories
+(``red laser (650 nm, 3.5mm spot)``) do, it is that.
 """
 
 from __future__ import annotations
@@ -42,7 +43,11 @@ _WORDS = {
 }
 _AXES = ("samplerotation", "angleofincidence", "scatterazimuth", "scatterradial")
 _BLOCKS = {"monochrome": "", "tristimulusx": "X", "tristimulusy": "Y", "tristimulusz": "Z"}
-_WAVELENGTH = re.compile(r"wavelength\W*(nm|[uµ]m)?\W*?(\d+\.?\d*|\.\d+)\s*(nm|[uµ]m)?", re.IGNORECASE)
+_NANOMETRES = re.compile(r"(?<![\w.])(\d+\.?\d*)\s*(nm|[uµ]m)\b", re.IGNORECASE)
+_STATED = re.compile(r"wavelength\W*\(?(nm|[uµ]m)\)?\W*?(\d+\.?\d*)", re.IGNORECASE)
+_LIGHT = re.compile(r"wavelength|lambda|λ|laser|light|lamp|\bled\b", re.IGNORECASE)
+#: Comments become a title up to so many characters.
+_LONGEST_TITLE = 200
 
 
 @dataclass(frozen=True)
@@ -163,7 +168,7 @@ def read_zemax(path: str | Path, *, every: int | None = None) -> xr.Dataset:
         where,
         grid=True,
         attrs={
-            "title": "; ".join(filter(None, lines.comments)),
+            "title": _title(lines.comments),
             "source": path.name + thinning_in_words(step),
         },
     )
@@ -222,12 +227,20 @@ def _block(
 
 
 def _wavelength(comments: list[str]) -> float | None:
-    """The wavelength that a comment states, nm."""
+    """The one wavelength that the comments name, nm; None if they name none or several."""
+    named = set()
     for comment in comments:
-        found = _WAVELENGTH.search(comment)
-        if found and (unit := found[1] or found[3]):
-            return float(found[2]) * (1.0 if unit.lower() == "nm" else 1000.0)
-    return None
+        found = [(number, unit) for unit, number in _STATED.findall(comment)]
+        if not found and _LIGHT.search(comment):
+            found = _NANOMETRES.findall(comment)
+        named |= {float(number) * (1.0 if unit.lower() == "nm" else 1000.0) for number, unit in found}
+    return named.pop() if len(named) == 1 else None
+
+
+def _title(comments: list[str]) -> str:
+    """The comments in one line, without those that only draw one."""
+    sentences = "; ".join(comment for comment in comments if re.search(r"\w", comment))
+    return sentences if len(sentences) <= _LONGEST_TITLE else f"{sentences[: _LONGEST_TITLE - 2]} …"
 
 
 def _begins_as_zemax(path: Path) -> bool:
