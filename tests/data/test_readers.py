@@ -339,3 +339,12 @@ def test_a_format_of_ours_is_known_under_the_extension_of_another(text_file):
     """A FRED table saved as .tsv, which is a table's extension, is still one."""
     path = text_file("type bsdf_data\nformat angles=deg bsdf=value scale=1\n10 0\n10 0 0.5\n", "paint.tsv")
     assert read(path).sizes["geometry"] == 1
+
+
+@pytest.mark.parametrize("name", ["paint.merl", "paint.bin", "paint.binary", "paint.data"])
+def test_a_merl_table_is_known_by_its_first_bytes(tmp_path, name):
+    path = tmp_path / name
+    path.write_bytes(struct.pack("<3i", 90, 90, 180))
+    assert readers.format_of(path) == "merl"
+    with pytest.raises(DataError, match="it is truncated"):
+        read(path)

@@ -70,6 +70,27 @@ def test_a_spectrum_that_varies_gives_wavelengths(text_file):
     assert_allclose(red["I"].values[red["group"].values == 15], 0.6 / np.pi, rtol=2e-4)
 
 
+def test_angles_of_anisotropy_are_groups(text_file):
+    """The scale is that of the table at the angles of the spectrum, for all of them."""
+    text = anisotropic(levels=(7.0, 14.0, 3.0)).replace(
+        "\n1\n0.0\t\n2\n15.0\t30.0\t\n15.0\t0\n", "\n2\n0 90\n2\n15.0 30.0\n1\n20\n20\t90\n"
+    )
+    ds = read(text_file(text, "a.anisotropicbsdf"))
+    assert_array_equal(np.unique(ds["group"]), [0, 90])
+    assert_allclose(ds["I"].values[ds["group"].values == 90], 0.4 / np.pi, rtol=2e-4)
+    keep = (ds["group"].values == 0) & np.isclose(ds["theta_i"], np.deg2rad(30))
+    assert_allclose(ds["I"].values[keep], 14 / 3 * 0.4 / np.pi, rtol=2e-4)
+
+
+def test_transmission_beside_reflection_is_passed_over(text_file):
+    text = anisotropic(levels=(7.0, 14.0, 5.0), sides="1\t1").replace(
+        "\n15.0\t0\n\n2\n350 40\n850 40\n", "\n1\n0\n1\n20\n15 0\n\n1\n550 40\n15 0\n\n1\n550 90\n"
+    )
+    ds = read(text_file(text, "a.anisotropicbsdf"))
+    assert_array_equal(np.unique(ds["group"]), [15, 30])
+    assert_allclose(ds["I"].values[ds["group"].values == 15], 0.4 / np.pi, rtol=2e-4)
+
+
 def test_intensities_lose_their_cosine(text_file):
     ds = read(text_file(anisotropic(kind="0"), "a.anisotropicbsdf"))
     first = ds.isel(geometry=(ds["group"] == 15).values)
