@@ -50,6 +50,7 @@ _OWN = {
     "openmaterial": "pbrdf.data.formats.openmaterial",
     "matlab": "pbrdf.data.formats.matlab",
     "lighttools": "pbrdf.data.formats.lighttools",
+    "woollam": "pbrdf.data.formats.woollam",
     "alta": "pbrdf.data.formats.alta",
     "astm": "pbrdf.data.formats.astm",
 }
