@@ -45,7 +45,7 @@ def test_forward_is_opposite_the_incident_azimuth(text_file):
     assert_array_equal(np.unique(ds["wavelength"]), [550])
     assert_array_equal(np.unique(ds["group"]), [30])
     said = ds.attrs["assumptions"]
-    assert said[0] == "1 tables of the back side or of transmission were left out"
+    assert said[0] == "tables of the back side or of transmission were left out: 1"
     assert "azimuth 270 was taken as the forward half-plane" in said[1]
 
 

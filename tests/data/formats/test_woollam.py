@@ -79,6 +79,7 @@ def test_energies_are_wavelengths(text_file):
         (content(flip=-1.0), "its handedness is another"),
         (content(unit="furlongs"), "the unit of wavelengths"),
         (content().replace("mm12\t500\t50\t", "mm12\t500\t50\tx"), "line 8: mm12: 'x.* is not a number"),
+        (content().replace("mm12\t", "", 1), "line 8: a row without a tag: this file holds Ψ and Δ only"),
         (content().replace("mm12", "mn12", 1), "line 8: 'mn12' is not a tag"),
         (
             "\n".join(line for line in content().splitlines() if not line.startswith("mm")),

@@ -148,7 +148,7 @@ def test_a_cell_on_the_horizon_stays_and_one_below_goes(text_file):
 def test_zeros_are_cells_that_were_not_measured(text_file):
     ds = read(text_file(SMALL.replace("2.5 0.6", "2.5 0.0"), "a.bsdf"))
     assert ds.sizes["geometry"] == 11
-    assert ds.attrs["assumptions"] == ["1 cells hold 0: they were taken as not measured and left out"]
+    assert ds.attrs["assumptions"] == ["cells that hold 0 were taken as not measured and left out: 1"]
 
 
 def test_every_takes_some_nodes(text_file):

@@ -91,7 +91,7 @@ def read_lighttools(
         raise DataError(f"{path}: there are several POI: anisotropic files are not understood")
     said = []
     if len(wanted) < len(blocks):
-        said.append(f"{len(blocks) - len(wanted)} tables of the back side or of transmission were left out")
+        said.append(f"tables of the back side or of transmission were left out: {len(blocks) - len(wanted)}")
     if azimuth is None:
         said.append(
             "the file does not say where phi = 0 lies; azimuth 270 was taken as the forward half-plane"

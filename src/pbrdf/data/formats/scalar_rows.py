@@ -75,7 +75,7 @@ def scalar_rows(
         zero = keep & (values == 0.0)
         keep &= ~zero
         if zero.any():
-            sentences.append(f"{zero.sum()} cells hold 0: they were taken as not measured and left out")
+            sentences.append(f"cells that hold 0 were taken as not measured and left out: {zero.sum()}")
     if not keep.any():
         raise DataError(f"{path}: no row of the table has a value above the horizon")
     extra = {key: value for key, value in (attrs or {}).items() if value != ""}

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from pbrdf.data.build import assemble
 from pbrdf.data.conventions import mueller_flip_v
 from pbrdf.data.formats.declaration import Reader
-from pbrdf.data.formats.number_lines import NumberLines
+from pbrdf.data.formats.number_lines import NumberLines, parsed_number
 from pbrdf.data.formats.scalar_rows import incidence_groups
 from pbrdf.data.schema import NATURAL_LIGHT
 from pbrdf.data.select import match_wavelengths
@@ -74,6 +74,8 @@ def read_woollam(path: str | Path, *, wavelength: float | Sequence[float] | None
     while lines.peek() is not None:
         tag, *cells = lines.text("a row").split()
         found = _ELEMENT.fullmatch(tag)
+        if parsed_number(tag) is not None:
+            raise lines.error("a row without a tag: this file holds Ψ and Δ only; export the Mueller matrix")
         if found is None and not _IGNORED.fullmatch(tag):
             raise lines.error(f"{tag!r} is not a tag of a Mueller matrix file (mm11 … mm44, E, dPolE)")
         numbers = [lines.number_in(cell, tag) for cell in cells]
