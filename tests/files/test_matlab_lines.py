@@ -53,6 +53,27 @@ def test_a_matrix_over_wavelengths_has_a_column_for_each(saved):
     assert [float(cell) for cell in rows[1]] == [2.0, 2.0, 3.0]
 
 
+@pytest.mark.parametrize("version", [5, 7.3])
+def test_an_array_over_axes_has_a_row_for_each_element(saved, version):
+    """Axes are told by their lengths, in whatever order the array has them."""
+    grid = np.arange(24.0).reshape(4, 2, 3)
+    path = saved(
+        version,
+        theta_i=[10.0, 20.0],
+        theta_r=[1.0, 2.0, 3.0],
+        phi=[0.0, 60.0, 120.0, 180.0],
+        brdf=grid,
+        n=1.5,
+    )
+    names, *rows = (line.split("\t") for line in matlab_lines(path))
+    assert len(rows) == 24
+    for row in rows:
+        at = dict(zip(names, map(float, row), strict=True))
+        i, r, p = int(at["theta_i"] / 10) - 1, int(at["theta_r"]) - 1, int(at["phi"] / 60)
+        assert at["brdf"] == grid[p, i, r]
+        assert at["n"] == 1.5
+
+
 @pytest.mark.parametrize(
     "content",
     [
@@ -61,8 +82,9 @@ def test_a_matrix_over_wavelengths_has_a_column_for_each(saved):
         {"x": [1.0, 2.0], "y": [1.0, 2.0, 3.0]},
         {"x": [1.0, 2.0], "grid": np.ones((4, 5))},
         {"x": [1.0, 2.0], "wavelength": [1.0, 2.0], "grid": np.ones((2, 2))},
+        {"x": [1.0, 2.0], "y": [1.0, 2.0, 3.0], "grid": np.ones((2, 3)), "other": np.ones((3, 4))},
     ],
 )
 def test_other_arrays_are_listed(saved, content):
-    with pytest.raises(DataError, match=r"a\.mat: vectors of one length, .* are needed; this file holds"):
+    with pytest.raises(DataError, match=r"a\.mat: vectors of one length, .* needed; this file holds"):
         matlab_lines(saved(**content))

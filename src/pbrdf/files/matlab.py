@@ -2,13 +2,14 @@
 
 Up to version 7 they are read by :mod:`pbrdf.files.mat5`; those of version 7.3 are HDF5 files, with the dimensions in
 reverse. As a table a file is a column for each vector, under its variable's name, and for each single number; of a
-matrix with as many columns as there are wavelengths in a vector, a column for each of them.
+matrix with as many columns as there are wavelengths in a vector, a column for each of them. Where vectors differ in
+length and arrays run over them, a dimension for each, there is a row for each of their elements.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -123,11 +124,14 @@ def matlab_lines(path: Path) -> list[str]:
             vectors.remove(waves)
     used = [*vectors, *single, *matrices, *([waves] if matrices else [])]
     lengths = {max(array.shape) for array in vectors}
+    grids = [array for array in arrays if sorted(array.shape) == sorted(max(v.shape) for v in vectors)]
+    if len(lengths) == len(vectors) > 1 and grids and len(used) + len(grids) == len(arrays):
+        return _grid_lines(vectors, single, grids)
     if len(lengths) != 1 or len(used) != len(arrays):
         listed = ", ".join(f"{a.name} ({' x '.join(map(str, a.shape))})" for a in arrays) or "no numbers"
         raise DataError(
-            f"{path}: vectors of one length, named like the columns of a table (theta_i, theta_r, phi, brdf), are "
-            f"needed; this file holds {listed}"
+            f"{path}: vectors of one length, named like the columns of a table (theta_i, theta_r, phi, brdf), or "
+            f"axes of different lengths and arrays over them are needed; this file holds {listed}"
         )
     (length,) = lengths
     columns: dict[str, NDArray[Any]] = {array.name: array.load().ravel() for array in vectors}
@@ -135,5 +139,24 @@ def matlab_lines(path: Path) -> list[str]:
     for array in matrices:
         for nanometres, values in zip(waves.load().ravel(), array.load().T, strict=True):  # type: ignore[union-attr]
             columns[f"{array.name}_{nanometres:g}nm"] = values
+    return _lines(columns)
+
+
+def _grid_lines(
+    axes: Sequence[MatlabArray], single: Sequence[MatlabArray], grids: Sequence[MatlabArray]
+) -> list[str]:
+    """A row for each element of arrays over axes of lengths that all differ, whatever their order."""
+    lengths = [max(axis.shape) for axis in axes]
+    # first the arrays: that they are as large as they declare shows before anything else is
+    values = {
+        array.name: array.load().transpose([array.shape.index(n) for n in lengths]).ravel() for array in grids
+    }
+    mesh = np.meshgrid(*(axis.load().ravel() for axis in axes), indexing="ij")
+    columns = {axis.name: nodes.ravel() for axis, nodes in zip(axes, mesh, strict=True)}
+    columns |= {array.name: np.full(math.prod(lengths), array.load().ravel()[0]) for array in single}
+    return _lines(columns | values)
+
+
+def _lines(columns: Mapping[str, NDArray[Any]]) -> list[str]:
     cells = [[repr(value) for value in column.tolist()] for column in columns.values()]
     return ["\t".join(columns), *("\t".join(row) for row in zip(*cells, strict=True))]

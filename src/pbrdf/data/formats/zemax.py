@@ -244,10 +244,8 @@ def _title(comments: list[str]) -> str:
 
 
 def _begins_as_zemax(path: Path) -> bool:
-    return (
-        begins_with(path, r"(source|symmetry)\s+\w+$")
-        and b"angleofincidence" in first_bytes(path, 4096).lower()
-    )
+    first = r"(source|symmetry|spectralcontent|scattertype|samplerotation|angleofincidence)\s+\w+$"
+    return begins_with(path, first) and b"angleofincidence" in first_bytes(path, 4096).lower()
 
 
 READER = Reader("zemax", read_zemax, extensions=(".bsdf", ".txt", ".dat"), sniff=_begins_as_zemax)
