@@ -88,3 +88,13 @@ def test_an_array_over_axes_has_a_row_for_each_element(saved, version):
 def test_other_arrays_are_listed(saved, content):
     with pytest.raises(DataError, match=r"a\.mat: vectors of one length, .* needed; this file holds"):
         matlab_lines(saved(**content))
+
+
+def test_a_size_that_the_file_cannot_hold_is_seen_before_it_is_allocated(tmp_path):
+    path = tmp_path / "a.mat"
+    with h5py.File(path, "w", userblock_size=512) as file:
+        file.create_dataset("x", (1, 10**7), "f8", chunks=(1, 1000))  # nothing of it is written
+    with path.open("r+b") as file:
+        file.write(b"MATLAB 7.3 MAT-file")
+    with pytest.raises(DataError, match=r"x cannot have the shape \(10000000, 1\) in a file of this size"):
+        matlab_lines(path)

@@ -25,6 +25,8 @@ from pbrdf.files.text import first_bytes
 __all__ = ["MatlabArray", "is_matlab", "matlab_arrays", "matlab_lines"]
 
 _WAVELENGTHS = ("wavelength", "wavelengths", "lambda", "wvl", "wvls", "wl", "nm", "wavelength_nm")
+#: How much deflated numbers can grow: deflate stops at about 1032.
+_LARGEST_RATIO = 1100
 
 
 class MatlabArray(Protocol):
@@ -50,7 +52,12 @@ class _Mat73Array:
         if not self.is_real:
             raise DataError(f"{self.path}: the variable {self.name} does not hold real numbers")
         with _opened(self.path) as file:
-            return np.asarray(file[self.name][()]).T
+            item = file[self.name]
+            if item.nbytes > _LARGEST_RATIO * self.path.stat().st_size:
+                raise DataError(
+                    f"{self.path}: {self.name} cannot have the shape {self.shape} in a file of this size: it is damaged"
+                )
+            return np.asarray(item[()]).T
 
 
 def is_matlab(path: Path) -> bool:

@@ -28,8 +28,6 @@ __all__ = ["READER", "read_matlab"]
 
 _AXES = ("phi_d", "theta_d", "theta_h", "wvls")
 _TABLES = ("pbrdf_T_f", "pbrdf_T")
-#: How much a compressed variable can grow: deflate stops at about 1032.
-_LARGEST_RATIO = 1100
 
 
 def read_matlab(
@@ -73,10 +71,6 @@ def read_matlab(
         raise DataError(
             f"{path}: the variable {name} has the shape {shapes[name]}, but its axes {', '.join(_AXES)} ask for "
             f"{(*counts, 4, 4)}"
-        )
-    if math.prod(shapes[name]) > _LARGEST_RATIO * path.stat().st_size:
-        raise DataError(
-            f"{path}: {name} cannot have the shape {shapes[name]} in a file of this size: it is damaged"
         )
     values: dict[str, NDArray[Any]] = {key: arrays[key].load() for key in (*_AXES, name)}
     axes = {axis: values[axis].ravel().astype(np.float64) for axis in _AXES}
