@@ -17,7 +17,7 @@ from pbrdf.cli.main import app
 from pbrdf.data import Reader, make_dataset, read, readers, register_reader, write
 from pbrdf.errors import DataError, PluginWarning
 
-OWN = ["csv", "netcdf", "zarr", "scatmech", "cornell", "pbsdf", "merl"]
+OWN = list(readers._OWN)
 DOCUMENT = Path(__file__).parents[2] / "docs" / "data-format.md"
 
 TABLE = "theta_i,theta_r,brdf\n30,30,0.5\n"
@@ -127,7 +127,9 @@ CONTENT = "PAIRS\n0.25 2\n0.5 4\n"
 
 
 def test_a_registered_reader_is_found_by_extension_content_and_name(text_file):
-    with pytest.raises(DataError, match=r"'\.prs' is not known; state the format, one of csv, .*, merl$"):
+    with pytest.raises(
+        DataError, match=rf"'\.prs' is not known; state the format, one of csv, .*, {OWN[-1]}$"
+    ):
         read(text_file(CONTENT, "data.prs"))
     register_reader(PAIRS)
     for name, options in (
@@ -138,7 +140,7 @@ def test_a_registered_reader_is_found_by_extension_content_and_name(text_file):
     ):
         assert_array_equal(read(text_file(CONTENT, name), level=3.0, **options)["I"], [6.0, 12.0])
     assert readers.format_names() == [*OWN, "pairs"]
-    with pytest.raises(DataError, match=r"use one of csv, .*, merl, pairs"):
+    with pytest.raises(DataError, match=r"use one of csv, .*, pairs"):
         read(text_file(CONTENT), format="none")
     with pytest.raises(
         DataError, match="the format pairs has no option 'column'; its options are every, level"
@@ -180,13 +182,9 @@ def test_the_command_line_knows_registered_readers(text_file, tmp_path, monkeypa
     )
     assert "2 geometries" in run("convert", source, tmp_path / "data.nc")
     assert "2 geometries" in run("convert", tmp_path / "data.nc", tmp_path / "again.prs")
-    assert "use one of csv, netcdf, zarr, scatmech, cornell, pbsdf, merl, pairs" in run(
-        "check", source, "--format", "xml", code=2
-    )
+    assert f"use one of {', '.join(OWN)}, pairs" in run("check", source, "--format", "xml", code=2)
     for command in ("fit", "plot", "check", "convert"):
-        assert "csv, netcdf, zarr, scatmech, cornell, pbsdf, merl or pairs; found out by" in run(
-            command, "--help"
-        )
+        assert f"{', '.join(OWN)} or pairs; found out by" in run(command, "--help")
     assert "New file: .prs, .csv, .nc or .zarr." in run("convert", "--help")
 
 
@@ -330,3 +328,23 @@ def test_a_broken_reader_is_named_and_does_not_stop_the_others(package, text_fil
     if name == "bad":
         with pytest.raises(DataError, match=rf"data\.csv: {words}"):
             read(text_file(TABLE), format="bad")
+
+
+@pytest.mark.parametrize(("name", "format"), [("t.csv", "csv"), ("t.pbsdf", "pbsdf"), ("t.xyz", None)])
+def test_the_format_of_a_file_is_told_without_reading_it(text_file, name, format):
+    assert readers.format_of(text_file("anything", name)) == format
+
+
+def test_a_format_of_ours_is_known_under_the_extension_of_another(text_file):
+    """A FRED table saved as .tsv, which is a table's extension, is still one."""
+    path = text_file("type bsdf_data\nformat angles=deg bsdf=value scale=1\n10 0\n10 0 0.5\n", "paint.tsv")
+    assert read(path).sizes["geometry"] == 1
+
+
+@pytest.mark.parametrize("name", ["paint.merl", "paint.bin", "paint.binary", "paint.data"])
+def test_a_merl_table_is_known_by_its_first_bytes(tmp_path, name):
+    path = tmp_path / name
+    path.write_bytes(struct.pack("<3i", 90, 90, 180))
+    assert readers.format_of(path) == "merl"
+    with pytest.raises(DataError, match="it is truncated"):
+        read(path)

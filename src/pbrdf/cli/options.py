@@ -210,7 +210,8 @@ _READING: dict[str, tuple[Any, Any]] = {
         Annotated[
             int | None,
             typer.Option(
-                help="Of a .pbsdf or MERL table, take one node in this many along each angle; 1 is all of them.",
+                help="Of a table over a grid of angles (.pbsdf, MERL, Zemax …), take one node in this many along each "
+                "angle; 1 is all of them.",
                 show_default="so many that at most 20 000 cells are left",
                 min=1,
                 metavar="N",

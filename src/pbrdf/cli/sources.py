@@ -29,6 +29,8 @@ def open_model(source: str) -> Model:
     if source.lstrip().startswith("{"):
         return load_model(source)
     path = Path(source)
+    if path.exists():
+        _refuse_measurements(path)
     if path.is_dir():
         if not (path / "model.json").is_file():
             raise PbrdfError(
@@ -38,6 +40,21 @@ def open_model(source: str) -> Model:
     elif not path.exists() and not path.suffix:
         raise PbrdfError(f"{source}: there is no such file, and no paint of that name: {', '.join(PAINTS)}")
     return load_model(path)
+
+
+def _refuse_measurements(path: Path) -> None:
+    """Raise PbrdfError if this is a file of data: it names the step that makes a model of it."""
+    from pbrdf.data.readers import format_of
+
+    if path.suffix.lower() == ".json" or (path / "model.json").is_file():
+        return
+    name = format_of(path)
+    if name is not None:
+        kind = path.suffix if path.suffix else name
+        raise PbrdfError(
+            f"{path}: {kind} tables are measurements, not models; fit them first (pbrdf fit {path}), and give the "
+            "folder of the fit"
+        )
 
 
 def open_single_model(source: str) -> Model:

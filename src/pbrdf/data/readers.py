@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 __all__ = [
     "GROUP",
     "format_names",
+    "format_of",
     "read",
     "register_reader",
     "write",
@@ -40,8 +41,18 @@ _OWN = {
     "zarr": "pbrdf.data.formats.zarr_folder",
     "scatmech": "pbrdf.data.formats.scatmech",
     "cornell": "pbrdf.data.formats.cornell",
+    "zemax": "pbrdf.data.formats.zemax",
+    "rgl": "pbrdf.data.formats.rgl",
     "pbsdf": "pbrdf.data.formats.pbsdf",
     "merl": "pbrdf.data.formats.merl",
+    "fred": "pbrdf.data.formats.fred",
+    "speos": "pbrdf.data.formats.speos",
+    "openmaterial": "pbrdf.data.formats.openmaterial",
+    "matlab": "pbrdf.data.formats.matlab",
+    "lighttools": "pbrdf.data.formats.lighttools",
+    "woollam": "pbrdf.data.formats.woollam",
+    "alta": "pbrdf.data.formats.alta",
+    "astm": "pbrdf.data.formats.astm",
 }
 _registered: dict[str, Reader] = {}
 
@@ -71,6 +82,15 @@ def format_names() -> list[str]:
     return list(dict.fromkeys((*_OWN, *_registered, *installed)))
 
 
+def format_of(path: str | Path) -> str | None:
+    """Name of the format that a file, or a folder, has by its content or its extension; None if it has none."""
+    path = Path(path)
+    return next(
+        (reader.name for reader in _readers() if _sniffs(reader, path)),
+        next((reader.name for reader in _readers() if path.suffix.lower() in reader.extensions), None),
+    )
+
+
 def written_extensions() -> list[str]:
     """Extensions of the files that :func:`write` writes."""
     return list(dict.fromkeys(extension for reader in _readers() for extension in reader.written))
@@ -89,13 +109,13 @@ def read(
         For CSV: the file's column names by the names used here, see
         :func:`pbrdf.data.formats.csv_table.reading.read_csv`.
     format
-        ``"csv"``, ``"netcdf"``, ``"zarr"``, ``"scatmech"``, ``"cornell"``, ``"pbsdf"``, ``"merl"`` or one that was
+        One of :func:`format_names`: ``"csv"``, ``"netcdf"``, ``"zarr"``, ``"pbsdf"``, ``"zemax"`` …, or one that was
         added (:func:`register_reader`); None finds it out from the extension and the content.
     **options
         Options of the format's reader: for ``"csv"`` those of :func:`pbrdf.data.formats.csv_table.reading.read_csv`
         (`where`, `skip_invalid`, `quantity`, `azimuth`, `stokes`, `illumination`, `cosine_weighted`,
-        `angles`); for ``"scatmech"``, ``"cornell"`` and ``"pbsdf"`` `wavelength` in nm, one or several; for
-        ``"pbsdf"`` and ``"merl"`` `every`, see :func:`pbrdf.data.formats.pbsdf.read_pbsdf`.
+        `angles`); for formats with wavelengths of their own `wavelength` in nm, one or several; for those of tables
+        over a grid of angles `every`, see :func:`pbrdf.data.formats.pbsdf.read_pbsdf`.
 
     Returns
     -------
@@ -182,15 +202,15 @@ def _of_name(path: Path, name: str) -> Reader:
 def _of_content(path: Path) -> Reader:
     """The reader of a file.
 
-    That of its extension which knows its content; else one of its extension that does not look at the content; else any
-    that knows it; else one of its extension, which then says what is wrong.
+    That of its extension which knows its content; else one of this package that knows it; else one of its extension
+    that does not look at the content; else any that knows it; else one of its extension, which then says what is
+    wrong.
     """
     readers = list(_readers())
     named = [reader for reader in readers if path.suffix.lower() in reader.extensions]
     plain = [reader for reader in named if reader.sniff is None]
-    known = next((reader for reader in named if _sniffs(reader, path)), None)
-    if known is None and not plain:
-        known = next((reader for reader in readers if _sniffs(reader, path)), None)
+    asked = [*named, *(reader for reader in readers if not plain or reader.name in _OWN)]
+    known = next((reader for reader in asked if _sniffs(reader, path)), None)
     found = [*([] if known is None else [known]), *plain, *named]
     if path.is_dir():
         found = [reader for reader in found if reader.folder]

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from pbrdf.errors import DataError
 from pbrdf.files.atomic import atomic_file
+from pbrdf.files.matlab import is_matlab, matlab_lines
 from pbrdf.files.text import first_bytes, lines_of, read_lines
 
 __all__ = ["Row", "Table", "column_names", "read_table", "write_table"]
@@ -177,7 +178,7 @@ def read_table(path: Path) -> Table:
     DataError
         If the file cannot be read, has no line of column names, or a row has not as many cells as there are names.
     """
-    lines = read_lines(path)
+    lines = matlab_lines(path) if is_matlab(path) else read_lines(path)
     comments = [(number, line.strip()) for number, line in enumerate(lines, 1) if _is_comment(line)]
     start = _start(lines)
     if start is None:

@@ -189,7 +189,11 @@ def load_model(source: str | os.PathLike[str] | Mapping[str, Any]) -> Model:
             where = f"{text}: "
             try:
                 text = Path(text).read_text(encoding="utf-8")
-            except (OSError, UnicodeDecodeError) as error:
+            except UnicodeDecodeError as error:
+                raise ModelError(
+                    f"{where}not a text file, so not a model; measurements become one by a fit (pbrdf fit FILE)"
+                ) from error
+            except OSError as error:
                 raise ModelError(f"{where}cannot be read as a model: {error}") from error
         try:
             content = json.loads(text)

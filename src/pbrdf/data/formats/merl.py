@@ -191,4 +191,4 @@ def _begins_as_merl(path: Path) -> bool:
     return first_bytes(path, _HEADER.size) == _HEADER.pack(*SHAPE)
 
 
-READER = Reader("merl", read_merl, extensions=(".binary",), sniff=_begins_as_merl)
+READER = Reader("merl", read_merl, extensions=(".binary", ".merl", ".bin"), sniff=_begins_as_merl)

@@ -17,6 +17,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -44,6 +45,7 @@ __all__ = [
     "READER",
     "SIMULATED",
     "PolarizedTable",
+    "dataset_from_table",
     "mueller_from_pbsdf",
     "mueller_to_pbsdf",
     "read_pbsdf",
@@ -92,20 +94,20 @@ class PolarizedTable:
     Attributes
     ----------
     theta_h, theta_d, phi_d
-        Nodes in radians, float32, ascending; shapes (Nh,), (Nd,) and (Np,).
+        Nodes in radians, ascending, float32 in a file; shapes (Nh,), (Nd,) and (Np,).
     wavelength
         In nm, whole numbers, shape (Nw,).
     matrices
-        float32, shape (Np, Nd, Nh, Nw, 4, 4), in the convention of the file, 1/sr.
+        Shape (Np, Nd, Nh, Nw, 4, 4), float32 in a file, in the convention of the file, 1/sr.
     description
         Where the table comes from; begins with :data:`SIMULATED` if a model produced it.
     """
 
-    theta_h: NDArray[np.float32]
-    theta_d: NDArray[np.float32]
-    phi_d: NDArray[np.float32]
-    wavelength: NDArray[np.uint16]
-    matrices: NDArray[np.float32]
+    theta_h: NDArray[np.floating[Any]]
+    theta_d: NDArray[np.floating[Any]]
+    phi_d: NDArray[np.floating[Any]]
+    wavelength: NDArray[Any]
+    matrices: NDArray[np.floating[Any]]
     description: str = ""
 
     def mueller(
@@ -230,7 +232,17 @@ def read_pbsdf(
         As :func:`read_table`; if nothing is left of the table, or a wavelength is not in it.
     """
     path = Path(path)
-    table = read_table(path)
+    return dataset_from_table(read_table(path), path, wavelength=wavelength, every=every)
+
+
+def dataset_from_table(
+    table: PolarizedTable,
+    path: Path,
+    *,
+    wavelength: float | Sequence[float] | None = None,
+    every: int | None = None,
+) -> xr.Dataset:
+    """The data set of :func:`read_pbsdf` from a table that was read from `path`."""
     available = table.wavelength.astype(np.float64)
     chosen = match_wavelengths(available, wavelength, str(path))
     step = thinning(table.matrices.shape[:3], every, str(path))
@@ -267,4 +279,4 @@ def read_pbsdf(
     return ds
 
 
-READER = Reader("pbsdf", read_pbsdf, extensions=(".pbsdf",), sniff=is_tensor_file)
+READER = Reader("pbsdf", read_pbsdf, extensions=(".pbsdf", ".hpbrdf"), sniff=is_tensor_file)

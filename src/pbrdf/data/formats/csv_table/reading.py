@@ -120,5 +120,5 @@ def _without_invalid(ds: xr.Dataset, lines: list[int]) -> tuple[xr.Dataset, list
 
 
 READER = Reader(
-    "csv", read_csv, extensions=(".csv", ".tsv", ".txt", ".dat"), write=write_csv, written=(".csv",)
+    "csv", read_csv, extensions=(".csv", ".tsv", ".txt", ".dat", ".mat"), write=write_csv, written=(".csv",)
 )
