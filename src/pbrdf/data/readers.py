@@ -10,6 +10,7 @@ from __future__ import annotations
 import functools
 import importlib
 import importlib.metadata
+import re
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
@@ -94,7 +95,7 @@ def read(
     **options
         Options of the format's reader: for ``"csv"`` those of :func:`pbrdf.data.formats.csv_table.reading.read_csv`
         (`where`, `skip_invalid`, `quantity`, `azimuth`, `stokes`, `illumination`, `cosine_weighted`,
-        `angles`); for ``"scatmech"``, ``"cornell"`` and ``"pbsdf"`` `wavelength` in nm, one or several; for
+        `angles`, `sheet`); for ``"scatmech"``, ``"cornell"`` and ``"pbsdf"`` `wavelength` in nm, one or several; for
         ``"pbsdf"`` and ``"merl"`` `every`, see :func:`pbrdf.data.formats.pbsdf.read_pbsdf`.
 
     Returns
@@ -192,6 +193,8 @@ def _of_content(path: Path) -> Reader:
     if known is None and not plain:
         known = next((reader for reader in readers if _sniffs(reader, path)), None)
     found = [*([] if known is None else [known]), *plain, *named]
+    if not found and path.is_file() and _has_angles(path):
+        found = [_own("csv")]
     if path.is_dir():
         found = [reader for reader in found if reader.folder]
         if not found:
@@ -203,6 +206,13 @@ def _of_content(path: Path) -> Reader:
             f"{', '.join(format_names())}{also}"
         )
     return found[0]
+
+
+def _has_angles(path: Path) -> bool:
+    """Whether a file of an extension that no format has is a table with columns of zenith angles."""
+    from pbrdf.files.delimited import column_names
+
+    return any(re.search("theta|zenith|inciden|aoi", name.lower()) for name in column_names(path))
 
 
 def _sniffs(reader: Reader, path: Path) -> bool:

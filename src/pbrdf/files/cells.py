@@ -1,0 +1,305 @@
+"""The cells of a table: their texts, and columns of numbers, without a text for each where it is not asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrdf.files.layout import BLANKS, kept_comment, split_records
+from pbrdf.files.numbers import PADDING, parse_cells, to_number
+
+__all__ = ["Body", "Cells", "RaggedRowError", "read_body"]
+
+_WIDEST = 64
+
+
+class Cells(Protocol):
+    """The cells of N rows, as many in each."""
+
+    def __len__(self) -> int: ...
+
+    def text(self, row: int, column: int) -> str:
+        """What a cell holds."""
+
+    def texts(self, column: int) -> list[str]:
+        """What the cells of a column hold."""
+
+    def floats(self, column: int) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+        """Numbers of a column, NaN where a cell is none or may be none, and which cells these are."""
+
+    def rows(self) -> list[list[str]]:
+        """All cells."""
+
+    def taken(self, rows: Sequence[int]) -> Cells:
+        """The cells of these rows alone."""
+
+
+@dataclass(frozen=True, eq=False)
+class Texts:
+    """Cells as texts."""
+
+    cells: list[list[str]]
+    decimal_comma: bool
+
+    def __len__(self) -> int:
+        return len(self.cells)
+
+    def text(self, row: int, column: int) -> str:
+        return self.cells[row][column]
+
+    def texts(self, column: int) -> list[str]:
+        return [cells[column] for cells in self.cells]
+
+    def floats(self, column: int) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+        found = [to_number(text, self.decimal_comma) for text in self.texts(column)]
+        odd = [row for row, number in enumerate(found) if number is None]
+        return np.array([np.nan if x is None else x for x in found]), np.array(odd, dtype=np.intp)
+
+    def rows(self) -> list[list[str]]:
+        return self.cells
+
+    def taken(self, rows: Sequence[int]) -> Texts:
+        return Texts([self.cells[row] for row in rows], self.decimal_comma)
+
+
+@dataclass(frozen=True, eq=False)
+class Slices:
+    """Cells as parts of a text.
+
+    Attributes
+    ----------
+    buffer
+        UTF-8, with :data:`pbrdf.files.numbers.PADDING` bytes at either end.
+    special
+        Positions of the characters that are no digits.
+    before, after
+        Which of them stand before and after each cell, shape (N, columns).
+    decimal_comma
+        Whether numbers may have decimal commas.
+    """
+
+    buffer: NDArray[np.uint8]
+    special: NDArray[np.intp]
+    before: NDArray[np.intp]
+    after: NDArray[np.intp]
+    decimal_comma: bool
+
+    def __len__(self) -> int:
+        return len(self.before)
+
+    def text(self, row: int, column: int) -> str:
+        begin, end = self.special[self.before[row, column]] + 1, self.special[self.after[row, column]]
+        return self.buffer[begin:end].tobytes().decode().strip()
+
+    def texts(self, column: int) -> list[str]:
+        begin = self.special[self.before[:, column]] + 1
+        length = self.special[self.after[:, column]] - begin
+        widest = int(length.max(initial=0))
+        if not widest:
+            return [""] * len(self)
+        if widest > _WIDEST:
+            return [self.text(row, column) for row in range(len(self))]
+        places = np.arange(widest)
+        # Padding allows to read a little beyond the end.
+        characters = self.buffer[np.minimum(begin[:, np.newaxis] + places, len(self.buffer) - 1)]
+        characters[places >= length[:, np.newaxis]] = 0
+        cells = characters.view(f"S{widest}").ravel().tolist()
+        return [cell.decode().strip() for cell in cells]
+
+    def floats(self, column: int) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+        before, after = self.before[:, column], self.after[:, column]
+        before, after = self._trimmed(before, after)
+        values, odd = parse_cells(self.buffer, self.special, before, after, self.decimal_comma)
+        for row in odd.tolist():
+            begin, end = self.special[before[row]] + 1, self.special[after[row]]
+            if begin < end:
+                number = to_number(self.buffer[begin:end].tobytes().decode().strip(), self.decimal_comma)
+                values[row] = np.nan if number is None else number
+        return values, odd
+
+    def _trimmed(
+        self, before: NDArray[np.intp], after: NDArray[np.intp]
+    ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Borders without the blanks at the beginning and the end of each cell."""
+        while True:
+            inner = before + 1 < after
+            leading = inner & _BLANK[self.buffer[self.special[before] + 1]]
+            if not leading.any():
+                break
+            before = before + leading
+        while True:
+            inner = before + 1 < after
+            closing = inner & _BLANK[self.buffer[self.special[after] - 1]]
+            if not closing.any():
+                return before, after
+            after = after - closing
+
+    def rows(self) -> list[list[str]]:
+        return self._rows
+
+    @cached_property
+    def _rows(self) -> list[list[str]]:
+        columns = [self.texts(column) for column in range(self.before.shape[1])]
+        return [list(cells) for cells in zip(*columns, strict=True)]
+
+    def taken(self, rows: Sequence[int]) -> Slices:
+        index = np.asarray(rows, dtype=np.intp)
+        return Slices(self.buffer, self.special, self.before[index], self.after[index], self.decimal_comma)
+
+
+def _among(characters: bytes) -> NDArray[np.bool_]:
+    table = np.zeros(256, dtype=bool)
+    table[np.frombuffer(characters, dtype=np.uint8)] = True
+    return table
+
+
+_BLANK = _among(b" \t\v\f")
+_GAP = _among(b" \t\v\f\n")
+
+
+@dataclass(frozen=True)
+class Body:
+    """Rows under the names.
+
+    Attributes
+    ----------
+    cells
+        Of the rows.
+    lines
+        Of the file, from 1, on which each row begins.
+    comments
+        With their numbers, as if the mark of all were ``#``.
+    """
+
+    cells: Cells
+    lines: list[int]
+    comments: list[tuple[int, str]]
+
+
+class RaggedRowError(Exception):
+    """A row has not as many cells as there are names.
+
+    Attributes
+    ----------
+    line, count
+        The row's line, and how many cells it has.
+    """
+
+    def __init__(self, line: int, count: int) -> None:
+        super().__init__(line, count)
+        self.line, self.count = line, count
+
+
+def read_body(text: bytes, separator: str, width: int, first: int) -> Body:
+    """Rows of a table.
+
+    Parameters
+    ----------
+    text
+        UTF-8, lines ended by ``\\n``.
+    separator
+        As :class:`pbrdf.files.layout.Layout` has it.
+    width
+        How many cells a row has; further ones must be empty.
+    first
+        Number of the first line in the file.
+
+    Raises
+    ------
+    RaggedRowError
+        If a row has another number of cells.
+    OpenQuotationError
+        If a cell does not end.
+    """
+    return (_quoted if b'"' in text else _plain)(text, separator, width, first)
+
+
+def _fit(cells: list[str], width: int, line: int) -> list[str]:
+    if len(cells) < width or any(cells[width:]):
+        raise RaggedRowError(line, len(cells))
+    return cells[:width]
+
+
+def _quoted(text: bytes, separator: str, width: int, first: int) -> Body:
+    lines = text.decode().split("\n")
+    found = [
+        (i, said)
+        for i, line in enumerate(lines, first)
+        if (said := kept_comment(line, separator)) is not None
+    ]
+    rows, numbers = [], []
+    for record in split_records(lines, separator, first):
+        rows.append(_fit(record.cells, width, record.line))
+        numbers.append(record.line)
+    return Body(Texts(rows, separator != ","), numbers, found)
+
+
+def _plain(text: bytes, separator: str, width: int, first: int) -> Body:
+    end = b"" if text.endswith(b"\n") else b"\n"
+    padding = b"0" * PADDING
+    buffer = np.frombuffer(b"".join((padding[1:], b"\n", text, end, padding)), dtype=np.uint8)
+    special = np.flatnonzero((buffer - np.uint8(48)) > 9)
+    split = _split_at_blanks if separator == BLANKS else _split_at_marks
+    before, after, begins, counts = split(buffer, special, separator)
+    # Position of each line's end, to read single lines by.
+    lines = np.flatnonzero(buffer[special] == 10)
+    edges = special[lines]
+
+    odd_starts = (
+        _among(b"#%/!;" + separator.encode() + b" \t\v\f\n") if separator != BLANKS else _among(b"#%/!;")
+    )
+    if separator == BLANKS:
+        at = np.minimum(begins, max(len(before) - 1, 0))
+        start = buffer[special[before[at]] + 1] if len(before) else np.zeros(len(counts), dtype=np.uint8)
+    else:
+        start = buffer[edges[:-1] + 1]
+    keep = counts == width
+    comments = []
+    for line in np.flatnonzero(~keep | odd_starts[start]).tolist():
+        whole = buffer[edges[line] + 1 : edges[line + 1]].tobytes().decode()
+        keep[line] = False
+        if not whole.strip():
+            continue
+        said = kept_comment(whole, separator)
+        if said is not None:
+            comments.append((first + line, said))
+            continue
+        cells = whole.split() if separator == BLANKS else [cell.strip() for cell in whole.split(separator)]
+        if any(cells):
+            _fit(cells, width, first + line)
+            keep[line] = True
+    if keep.all() and (counts == width).all():
+        shape = (len(counts), width)
+        before, after = before.reshape(shape), after.reshape(shape)
+    else:
+        index = begins[keep][:, np.newaxis] + np.arange(width)
+        before, after = before[index], after[index]
+    numbers = (np.flatnonzero(keep) + first).tolist()
+    return Body(Slices(buffer, special, before, after, separator != ","), numbers, comments)
+
+
+def _split_at_marks(
+    buffer: NDArray[np.uint8], special: NDArray[np.intp], separator: str
+) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
+    """Borders of all cells, the index of each line's first cell, and how many cells each line has."""
+    characters = buffer[special]
+    borders = np.flatnonzero((characters == ord(separator)) | (characters == 10))
+    ends = np.flatnonzero(characters[borders] == 10)
+    return borders[:-1], borders[1:], ends[:-1], np.diff(ends)
+
+
+def _split_at_blanks(
+    buffer: NDArray[np.uint8], special: NDArray[np.intp], separator: str
+) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
+    """As :func:`_split_at_marks`, at spaces and tabs."""
+    gap = _GAP[buffer[special]]
+    # The first special character is the line end before the text, the last that after it.
+    before = np.flatnonzero(gap & ~_GAP[buffer[special + 1]])[:-1]
+    after = np.flatnonzero(gap & ~_GAP[buffer[special - 1]])[1:]
+    begins = np.searchsorted(before, np.flatnonzero(buffer[special] == 10))
+    return before, after, begins[:-1], np.diff(begins)
