@@ -343,7 +343,7 @@ def _cut_off(table: Table) -> Iterator[str]:
     lengths = [len(table.cell(row, column)) for row in others]
     shortest = min(lengths)
     missing = shortest - len(last)
-    if missing > 1 or (missing == 1 and shortest == max(lengths) and shortest > 3):
+    if shortest > 3 and (missing > 1 or (missing == 1 and shortest == max(lengths))):
         yield (
             f"line {table.lines[-1]}: the last number, {last!r}, has fewer digits than any other of the column "
             f"{table.names[column]!r}, and no line end follows: the file seems cut off"
