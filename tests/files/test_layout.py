@@ -1,4 +1,4 @@
-"""Layouts of tables of text, each as instruments, spreadsheets and programs write it, with the numbers that are in it."""
+"""Layouts of tables of text, as instruments, spreadsheets and programs write them, with the numbers in them."""
 
 from __future__ import annotations
 
@@ -59,8 +59,8 @@ LAYOUTS = {
     "prose": "Goniometer 7, software 2.3\nMeasured on Monday, by A. B., at 22 degrees\n\n"
     "theta_i,theta_r,phi,brdf\n" + rows(","),
     "prose before blanks": "Measured on Monday by A B\nthe lamp was on\n\ntheta_i theta_r phi brdf\n" + rows(" "),
-    "keys and values": "Operator,Smith\nDate,2024-05-01\nAverages,10\nGain,2.5\n\ntheta_i,theta_r,phi,brdf\n" + rows(","),
-    "keys and values with semicolons": "Operator;Smith\nAverages;10\ntheta_i;theta_r;phi;brdf\n" + rows(";", comma=True),
+    "keys and values": "Operator,Smith\nDate,2024-05-01\nAverages,10\nGain,2\n\ntheta_i,theta_r,phi,brdf\n" + rows(","),
+    "keys and values, semicolons": "Operator;Smith\nAverages;10\ntheta_i;theta_r;phi;brdf\n" + rows(";", comma=True),
     "keys: values": "Operator: Smith\nTemperature: 21,5\n[Data]\ntheta_i;theta_r;phi;brdf\n" + rows(";", comma=True),
     "LabVIEW": "LabVIEW Measurement\t\nWriter_Version\t2\nSeparator\tTab\nDecimal_Separator\t,\n***End_of_Header***\t\n"
     "Channels\t4\t\t\t\nSamples\t3\t3\t3\t3\n***End_of_Header***\t\t\t\t\n"
@@ -144,7 +144,7 @@ def test_remarks_before_the_names_are_kept_and_told(table):
         "lines 1 to 4 of the file ('Operator: Smith' …) were taken as remarks, not as data"
     ]
     assert table(LAYOUTS["Origin"]).warnings == [
-        "line 3 of the file ('white paint') were taken as remarks, not as data"
+        "line 3 of the file ('white paint') was taken as a remark, not as data"
     ]
     for quiet in ("one blank", "numpy.savetxt", "a row of units", "Excel's line of the separator"):
         assert table(LAYOUTS[quiet]).warnings == []
@@ -223,10 +223,10 @@ def test_a_page_of_html_is_told(table):
 
 def test_a_file_that_ends_within_a_row_is_cut_off(table):
     with pytest.raises(
-        DataError, match="line 3: 2 cells under 3 column names; the file ends there .* cut off"
+        DataError, match=r"line 3: 2 cells under 3 column names; the file ends there .* cut off"
     ):
         table("a,b,c\n1,2,3\n1,2")
-    with pytest.raises(DataError, match="line 3: 2 cells under 3 column names$"):
+    with pytest.raises(DataError, match=r"line 3: 2 cells under 3 column names$"):
         table("a,b,c\n1,2,3\n1,2\n")
 
 

@@ -125,7 +125,7 @@ def test_thousands_are_refused_with_what_to_do(tmp_path):
     for cell in ("1,234.5", "1.234,5", "1'234", "12 345.5", "1\u202f234"):
         path.write_text(f"a;b\n1;{cell}\n", encoding="utf-8")
         with pytest.raises(
-            DataError, match="line 2, column 'b': .* is not a number; leave out the marks of thousands"
+            DataError, match=r"line 2, column 'b': .* is not a number; leave out the marks of thousands"
         ):
             read_table(path).numbers(1)
     path.write_text('a,b\n1,"1,234.5"\n')

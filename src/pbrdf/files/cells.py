@@ -81,6 +81,8 @@ class Slices:
         Which of them stand before and after each cell, shape (N, columns).
     decimal_comma
         Whether numbers may have decimal commas.
+    padded
+        Whether cells may begin or end with blanks.
     """
 
     buffer: NDArray[np.uint8]
@@ -88,6 +90,7 @@ class Slices:
     before: NDArray[np.intp]
     after: NDArray[np.intp]
     decimal_comma: bool
+    padded: bool
 
     def __len__(self) -> int:
         return len(self.before)
@@ -113,7 +116,8 @@ class Slices:
 
     def floats(self, column: int) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
         before, after = self.before[:, column], self.after[:, column]
-        before, after = self._trimmed(before, after)
+        if self.padded:
+            before, after = self._trimmed(before, after)
         values, odd = parse_cells(self.buffer, self.special, before, after, self.decimal_comma)
         for row in odd.tolist():
             begin, end = self.special[before[row]] + 1, self.special[after[row]]
@@ -149,7 +153,9 @@ class Slices:
 
     def taken(self, rows: Sequence[int]) -> Slices:
         index = np.asarray(rows, dtype=np.intp)
-        return Slices(self.buffer, self.special, self.before[index], self.after[index], self.decimal_comma)
+        return Slices(
+            self.buffer, self.special, self.before[index], self.after[index], self.decimal_comma, self.padded
+        )
 
 
 def _among(characters: bytes) -> NDArray[np.bool_]:
@@ -195,13 +201,15 @@ class RaggedRowError(Exception):
         self.line, self.count = line, count
 
 
-def read_body(text: bytes, separator: str, width: int, first: int) -> Body:
+def read_body(text: bytes, begin: int, separator: str, width: int, first: int) -> Body:
     """Rows of a table.
 
     Parameters
     ----------
     text
         UTF-8, lines ended by ``\\n``.
+    begin
+        Where the rows begin in it.
     separator
         As :class:`pbrdf.files.layout.Layout` has it.
     width
@@ -216,7 +224,8 @@ def read_body(text: bytes, separator: str, width: int, first: int) -> Body:
     OpenQuotationError
         If a cell does not end.
     """
-    return (_quoted if b'"' in text else _plain)(text, separator, width, first)
+    read = _plain if text.find(b'"', begin) < 0 else _quoted
+    return read(text, begin, separator, width, first)
 
 
 def _fit(cells: list[str], width: int, line: int) -> list[str]:
@@ -225,8 +234,8 @@ def _fit(cells: list[str], width: int, line: int) -> list[str]:
     return cells[:width]
 
 
-def _quoted(text: bytes, separator: str, width: int, first: int) -> Body:
-    lines = text.decode().split("\n")
+def _quoted(text: bytes, begin: int, separator: str, width: int, first: int) -> Body:
+    lines = text[begin:].decode().split("\n")
     found = [
         (i, said)
         for i, line in enumerate(lines, first)
@@ -239,10 +248,13 @@ def _quoted(text: bytes, separator: str, width: int, first: int) -> Body:
     return Body(Texts(rows, separator != ","), numbers, found)
 
 
-def _plain(text: bytes, separator: str, width: int, first: int) -> Body:
-    end = b"" if text.endswith(b"\n") else b"\n"
-    padding = b"0" * PADDING
-    buffer = np.frombuffer(b"".join((padding[1:], b"\n", text, end, padding)), dtype=np.uint8)
+def _plain(text: bytes, begin: int, separator: str, width: int, first: int) -> Body:
+    size = max(len(text) - begin - text.endswith(b"\n"), 0)
+    buffer = np.empty(size + 2 * PADDING + 1, dtype=np.uint8)
+    buffer[: PADDING - 1] = buffer[-PADDING:] = ord("0")
+    buffer[PADDING : PADDING + size] = np.frombuffer(text, np.uint8, size, begin) if size else 0
+    # A line end before the first row, and one after the last.
+    buffer[PADDING - 1] = buffer[PADDING + size] = 10
     special = np.flatnonzero((buffer - np.uint8(48)) > 9)
     split = _split_at_blanks if separator == BLANKS else _split_at_marks
     before, after, begins, counts = split(buffer, special, separator)
@@ -280,7 +292,8 @@ def _plain(text: bytes, separator: str, width: int, first: int) -> Body:
         index = begins[keep][:, np.newaxis] + np.arange(width)
         before, after = before[index], after[index]
     numbers = (np.flatnonzero(keep) + first).tolist()
-    return Body(Slices(buffer, special, before, after, separator != ","), numbers, comments)
+    padded = separator != BLANKS and any(text.find(blank, begin) >= 0 for blank in (b" ", b"\t", b"\v", b"\f"))
+    return Body(Slices(buffer, special, before, after, separator != ",", padded), numbers, comments)
 
 
 def _split_at_marks(

@@ -279,7 +279,7 @@ def _table(path: Path, text: bytes, separators: Sequence[str], sheet: str = "") 
         begin = text.find(b"\n", begin) + 1 or len(text)
     width = len(layout.names)
     try:
-        body = read_body(text[begin:], layout.separator, width, layout.body + 1)
+        body = read_body(text, begin, layout.separator, width, layout.body + 1)
     except RaggedRowError as ragged:
         hint = ""
         if layout.separator == "," and ragged.count > width:
@@ -330,7 +330,8 @@ def _passed_over(remarks: Sequence[tuple[int, str]]) -> Iterator[str]:
     if said:
         lines = f"lines {said[0][0]} to {said[-1][0]}" if len(said) > 1 else f"line {said[0][0]}"
         first = said[0][1] if len(said[0][1]) <= _SHOWN else said[0][1][:_SHOWN] + "…"
-        yield f"{lines} of the file ({first!r}{' …' if len(said) > 1 else ''}) were taken as remarks, not as data"
+        taken = "were taken as remarks" if len(said) > 1 else "was taken as a remark"
+        yield f"{lines} of the file ({first!r}{' …' if len(said) > 1 else ''}) {taken}, not as data"
 
 
 def _cut_off(table: Table) -> Iterator[str]:

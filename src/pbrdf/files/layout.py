@@ -37,7 +37,7 @@ SEPARATORS = (",", ";", "\t", BLANKS)
 _COMMENT = re.compile(r"\s*(?!#(?:N/A|[A-Z]+(?:/0)?[!?]))(?:#|%|//|!|;)+(.*)", re.DOTALL)
 _QUOTED = re.compile(r'"[^"]*"')
 _NO_NAMES = "there is no line of column names"
-_SCANNED = 500
+_FIRST, _SCANNED = 30, 500
 _LOOKED_AT = 20
 _MISSING = frozenset(("", "nan", "na", "n/a", "-", "--", "none", "null"))
 #: Units, in lower case without blanks, that are no names of columns, and those that may be.
@@ -181,11 +181,14 @@ def find_layout(path: Path, lines: Sequence[str], separators: Sequence[str] = SE
     DataError
         If there is no line of column names.
     """
-    found = [candidate for separator in separators for candidate in _candidates(lines, separator)]
-    most = max((candidate.score for candidate in found), default=0)
-    named = [c for c in found if c.layout is not None and 2 * c.score >= most]
-    if named and (layout := max(named, key=lambda c: c.score).layout) is not None:
-        return layout
+    for many in (_FIRST, _SCANNED):
+        found = [candidate for separator in separators for candidate in _candidates(lines, separator, many)]
+        most = max((candidate.score for candidate in found), default=0)
+        named = [c for c in found if c.layout is not None and 2 * c.score >= most]
+        layout = max(named, key=lambda c: c.score).layout if named else None
+        # A plain table shows itself early; remarks before the names may be long.
+        if layout is not None and (many == _SCANNED or not layout.remarks):
+            return layout
     first = next((line for line in lines if line.strip() and comment_of(line, "") is None), None)
     if first is None:
         raise DataError(f"{path}: {_NO_NAMES}")
@@ -215,12 +218,12 @@ def _many(count: int) -> str:
     return "the name" if count == 1 else f"the {count} names"
 
 
-def _records(lines: Sequence[str], separator: str) -> list[Record]:
+def _records(lines: Sequence[str], separator: str, many: int = _SCANNED) -> list[Record]:
     found = []
     try:
         for record in split_records(lines, separator):
             found.append(record)
-            if len(found) == _SCANNED:
+            if len(found) == many:
                 break
     except OpenQuotationError:
         pass
@@ -258,8 +261,8 @@ class _Candidate:
     layout: Layout | None
 
 
-def _candidates(lines: Sequence[str], separator: str) -> Iterator[_Candidate]:
-    records = _records(lines, separator)
+def _candidates(lines: Sequence[str], separator: str, many: int) -> Iterator[_Candidate]:
+    records = _records(lines, separator, many)
     kinds = [_kinds(record.cells, separator) for record in records]
     scores: Counter[int] = Counter()
     for record, kind in zip(records, kinds, strict=True):

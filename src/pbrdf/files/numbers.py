@@ -123,66 +123,93 @@ def _parse_block(
     # The cursor walks over the special characters of each cell: sign, point, exponent, its sign.
     cursor = before + 1
     position = special[cursor]
-    signed = _SIGN[buffer[position]] & (position == start) & (cursor < after)
-    negative = signed & _MINUS[buffer[position]]
-    start = start + signed
-    cursor = cursor + signed
-    position = special[cursor]
-    pointed = is_point[buffer[position]] & (cursor < after)
-    whole_end = position  # of the digits before the point; without one, of all digits
-    cursor = cursor + pointed
-    position = special[cursor]
-    scaled = _EXPONENT[buffer[position]] & (cursor < after)
-    digits_end = position
-    exponent: NDArray[np.int64] | int = 0
-    good = np.ones(len(start), dtype=bool)
-    if scaled.any():
-        cursor = cursor + scaled
-        after_letter = position + 1
+    character = buffer[position]
+    signed = _SIGN[character] & (position == start) & (cursor < after)
+    negative = None
+    if signed.any():
+        negative = signed & _MINUS[character]
+        start += signed
+        cursor += signed
         position = special[cursor]
-        turned = scaled & _SIGN[buffer[position]] & (position == after_letter) & (cursor < after)
-        down = turned & _MINUS[buffer[position]]
-        cursor = cursor + turned
-        count = np.where(scaled, end - after_letter - turned, 0)
-        good = (count > 0) & (count <= 8) | ~scaled
-        size = _digits(words, end, count, 1)[0].astype(np.int64)
-        exponent = np.where(down, -size, size)
-    whole = whole_end - start
-    part = np.where(pointed, digits_end - whole_end - 1, 0)
-    good &= (cursor == after) & (whole + part > 0) & (whole <= 19) & (part <= 24)
-    whole, part = np.where(good, whole, 0), np.where(good, part, 0)
+        character = buffer[position]
+    pointed = is_point[character] & (cursor < after)
+    whole = position - start  # digits before the point; without one, all
+    whole_end = position
+    cursor += pointed
+    exponent: NDArray[np.int64] | int = 0
+    digits_end, good = end, cursor == after
+    if not good.all():
+        position = special[cursor]
+        scaled = _EXPONENT[buffer[position]] & ~good
+        if scaled.any():
+            digits_end = np.where(scaled, position, end)
+            exponent, good = _exponents(buffer, words, special, cursor, after, scaled)
+    part = digits_end - whole_end - pointed
+    good &= (whole + part > 0) & (whole <= 19) & (part <= 24)
+    if not good.all():
+        whole, part = whole * good, part * good
 
-    before_point = _digits(words, whole_end, whole, _words(whole))
-    after_point = _digits(words, digits_end, part, _words(part))
-    mantissa, fits = _joined(before_point)
+    mantissa, fits = _joined(_digits(words, whole_end, whole))
     good &= fits
-    if part.any():
-        fraction, fits = _joined(after_point)
-        room = np.minimum(part, 19)
-        good &= fits & ((mantissa == 0) | ((part <= 18) & (whole + part <= 19)))
-        mantissa = mantissa * _INTEGER_POWERS[room] + fraction
-    values, sure = _scaled(mantissa, np.where(good, exponent - part, 0))
-    np.negative(values, out=values, where=negative)
+    longest = int(part.max(initial=0))
+    if longest:
+        fraction, fits = _joined(_digits(words, digits_end, part))
+        good &= fits
+        if longest + int(whole.max()) > 19:
+            good &= (mantissa == 0) | (whole + part <= 19)
+        mantissa = mantissa * _INTEGER_POWERS[np.minimum(part, 19)] + fraction
+    values, sure = _scaled(mantissa, exponent - part)
+    if negative is not None:
+        np.negative(values, out=values, where=negative)
     good &= sure
-    values[~good] = np.nan
+    if not good.all():
+        values[~good] = np.nan
     return values, good
 
 
-def _words(count: NDArray[np.intp]) -> int:
-    return max(1, -(-int(count.max(initial=0)) // 8))
+def _exponents(
+    buffer: NDArray[np.uint8],
+    words: NDArray[np.uint64],
+    special: NDArray[np.intp],
+    cursor: NDArray[np.intp],
+    after: NDArray[np.intp],
+    scaled: NDArray[np.bool_],
+) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Powers of ten where the cursor stands at the letter of one, and which cells end there as they should."""
+    begin = special[cursor] + 1
+    cursor = cursor + scaled
+    position = special[cursor]
+    character = buffer[position]
+    signed = scaled & _SIGN[character] & (position == begin) & (cursor < after)
+    cursor += signed
+    good = cursor == after
+    count = (special[after] - begin - signed) * (scaled & good)
+    good &= ~scaled | ((count > 0) & (count <= 8))
+    size = _digits(words, special[after], np.minimum(count, 8))[0].astype(np.int64)
+    return np.where(signed & _MINUS[character], -size, size), good
 
 
 def _digits(
-    words: NDArray[np.uint64], end: NDArray[np.intp], count: NDArray[np.intp], many: int
+    words: NDArray[np.uint64], end: NDArray[np.intp], count: NDArray[np.intp]
 ) -> list[NDArray[np.uint64]]:
     """The `count` digits that end before `end`, eight a number, the last ones first."""
     found = []
-    for k in range(many):
-        valid = np.clip(count - 8 * k, 0, 8)
-        w = words[end - 8 * (k + 1)] & _LAST[valid] & np.uint64(0x0F0F0F0F0F0F0F0F)
-        w = (w * np.uint64(10 * 2**8 + 1)) >> np.uint64(8)
-        w = ((w & np.uint64(0x00FF00FF00FF00FF)) * np.uint64(100 * 2**16 + 1)) >> np.uint64(16)
-        w = ((w & np.uint64(0x0000FFFF0000FFFF)) * np.uint64(10000 * 2**32 + 1)) >> np.uint64(32)
+    longest = int(count.max(initial=0))
+    for done in range(0, max(longest, 1), 8):
+        valid = count - done if done or longest > 8 else count
+        if done or longest > 8:
+            np.clip(valid, 0, 8, out=valid)
+        w = words[end - (done + 8)]
+        w &= _LAST[valid]
+        w &= np.uint64(0x0F0F0F0F0F0F0F0F)
+        w *= np.uint64(10 * 2**8 + 1)
+        w >>= np.uint64(8)
+        w &= np.uint64(0x00FF00FF00FF00FF)
+        w *= np.uint64(100 * 2**16 + 1)
+        w >>= np.uint64(16)
+        w &= np.uint64(0x0000FFFF0000FFFF)
+        w *= np.uint64(10000 * 2**32 + 1)
+        w >>= np.uint64(32)
         found.append(w)
     return found
 
@@ -202,15 +229,21 @@ def _scaled(
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """mantissa · 10^power, correctly rounded, and where that is sure."""
     size = np.abs(power)
+    largest = int(size.max(initial=0))
     sure = size <= _SCALE
-    size = np.minimum(size, _SCALE)
+    if largest > _SCALE:
+        size = np.minimum(size, _SCALE)
     whole = mantissa.astype(np.float64)
     scale = _POWERS[size]
     up = power > 0
-    values = whole / np.where(up, 1.0, scale)
     if up.any():
-        values = np.where(up, whole * scale, values)
-    hard = np.flatnonzero((mantissa >= np.uint64(2**53)) | (size > 22))
+        values = np.where(up, whole * scale, whole / scale)
+    else:
+        values = whole / scale
+    difficult = mantissa >= np.uint64(2**53)
+    if largest > 22:
+        difficult |= size > 22
+    hard = np.flatnonzero(difficult)
     if hard.size:
         corrected, certain = _corrected(mantissa[hard], size[hard], up[hard])
         values[hard] = corrected

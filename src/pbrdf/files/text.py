@@ -44,12 +44,12 @@ def utf8(path: Path, raw: bytes) -> bytes:
     DataError
         If they are no text; names the line.
     """
-    encoding = _encoding(raw)
+    encoding = "utf-8" if raw.isascii() and b"\0" not in raw else _encoding(raw)
     if encoding == "utf-8":
         text = raw.removeprefix(codecs.BOM_UTF8)
     else:
         text = raw.decode(encoding, errors="replace").removeprefix("\ufeff").encode()
-    if not raw.isascii() or b"\0" in text:
+    if not text.isascii() or b"\0" in text:
         _require_text(path, text, encoding)
     if b"\r" in text:
         text = text.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
