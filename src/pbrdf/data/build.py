@@ -178,6 +178,8 @@ def group_labels(values: ArrayLike) -> NDArray[Any]:
     if array.dtype.kind in "iu":
         return array.astype(np.int64)
     flat = array.ravel().tolist()
+    if flat and array.dtype.kind == "U":
+        return _text_labels(array, flat)
     if not all(isinstance(label, str) for label in flat):
         if all(isinstance(label, int | float) and float(label).is_integer() for label in flat):
             return array.astype(np.int64)
@@ -185,6 +187,14 @@ def group_labels(values: ArrayLike) -> NDArray[Any]:
     if flat and all(spells_integer(label) for label in flat):
         return array.astype(np.int64)
     return array.astype(np.str_)
+
+
+def _text_labels(array: NDArray[np.str_], flat: list[str]) -> NDArray[Any]:
+    """As :func:`group_labels`; few labels come many times."""
+    numbers = {label: int(label) for label in set(flat) if spells_integer(label)}
+    if not all(label in numbers for label in set(flat)):
+        return array
+    return np.array([numbers[label] for label in flat], dtype=np.int64).reshape(array.shape)
 
 
 def _floats(name: str, value: ArrayLike) -> NDArray[np.float64]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Protocol
 
@@ -19,7 +19,10 @@ _WIDEST = 64
 
 
 class Cells(Protocol):
-    """The cells of N rows, as many in each."""
+    """The cells of N rows, as many in each; `mixed` says whether points and decimal commas may stand side by side."""
+
+    @property
+    def mixed(self) -> bool: ...
 
     def __len__(self) -> int: ...
 
@@ -29,8 +32,8 @@ class Cells(Protocol):
     def texts(self, column: int) -> list[str]:
         """What the cells of a column hold."""
 
-    def floats(self, column: int) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
-        """Numbers of a column, NaN where a cell is none or may be none, and which cells these are."""
+    def floats(self, column: int) -> tuple[NDArray[np.float64], NDArray[np.intp], NDArray[np.intp]]:
+        """Numbers of a column, NaN where a cell is none; which cells hold another text, and which hold nothing."""
 
     def rows(self) -> list[list[str]]:
         """All cells."""
@@ -55,10 +58,17 @@ class Texts:
     def texts(self, column: int) -> list[str]:
         return [cells[column] for cells in self.cells]
 
-    def floats(self, column: int) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
-        found = [to_number(text, self.decimal_comma) for text in self.texts(column)]
+    @property
+    def mixed(self) -> bool:
+        return self.decimal_comma
+
+    def floats(self, column: int) -> tuple[NDArray[np.float64], NDArray[np.intp], NDArray[np.intp]]:
+        texts = self.texts(column)
+        found = [to_number(text, self.decimal_comma) for text in texts]
         odd = [row for row, number in enumerate(found) if number is None]
-        return np.array([np.nan if x is None else x for x in found]), np.array(odd, dtype=np.intp)
+        empty = [row for row in odd if not texts[row]]
+        values = np.array([np.nan if number is None else number for number in found], dtype=np.float64)
+        return values, np.setdiff1d(odd, empty).astype(np.intp), np.array(empty, dtype=np.intp)
 
     def rows(self) -> list[list[str]]:
         return self.cells
@@ -83,6 +93,8 @@ class Slices:
         Whether numbers may have decimal commas.
     padded
         Whether cells may begin or end with blanks.
+    mixed
+        Whether there are both points and decimal commas.
     """
 
     buffer: NDArray[np.uint8]
@@ -91,13 +103,13 @@ class Slices:
     after: NDArray[np.intp]
     decimal_comma: bool
     padded: bool
+    mixed: bool
 
     def __len__(self) -> int:
         return len(self.before)
 
     def text(self, row: int, column: int) -> str:
-        begin, end = self.special[self.before[row, column]] + 1, self.special[self.after[row, column]]
-        return self.buffer[begin:end].tobytes().decode().strip()
+        return self._between(self.before[row, column], self.after[row, column])
 
     def texts(self, column: int) -> list[str]:
         begin = self.special[self.before[:, column]] + 1
@@ -114,17 +126,27 @@ class Slices:
         cells = characters.view(f"S{widest}").ravel().tolist()
         return [cell.decode().strip() for cell in cells]
 
-    def floats(self, column: int) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+    def floats(self, column: int) -> tuple[NDArray[np.float64], NDArray[np.intp], NDArray[np.intp]]:
         before, after = self.before[:, column], self.after[:, column]
         if self.padded:
             before, after = self._trimmed(before, after)
         values, odd = parse_cells(self.buffer, self.special, before, after, self.decimal_comma)
-        for row in odd.tolist():
-            begin, end = self.special[before[row]] + 1, self.special[after[row]]
-            if begin < end:
-                number = to_number(self.buffer[begin:end].tobytes().decode().strip(), self.decimal_comma)
-                values[row] = np.nan if number is None else number
-        return values, odd
+        begin = self.special[before[odd]] + 1
+        length = self.special[after[odd]] - begin
+        empty = odd[length <= 0]
+        letters = self.buffer[begin[:, np.newaxis] + np.arange(3)] | 0x20
+        plain = (length == 3) & (letters == np.frombuffer(b"nan", dtype=np.uint8)).all(axis=1)
+        strange = []
+        for row in odd[(length > 0) & ~plain].tolist():
+            number = to_number(self._between(before[row], after[row]), self.decimal_comma)
+            if number is None:
+                strange.append(row)
+            else:
+                values[row] = number
+        return values, np.array(strange, dtype=np.intp), empty
+
+    def _between(self, before: int, after: int) -> str:
+        return self.buffer[self.special[before] + 1 : self.special[after]].tobytes().decode().strip()
 
     def _trimmed(
         self, before: NDArray[np.intp], after: NDArray[np.intp]
@@ -153,9 +175,7 @@ class Slices:
 
     def taken(self, rows: Sequence[int]) -> Slices:
         index = np.asarray(rows, dtype=np.intp)
-        return Slices(
-            self.buffer, self.special, self.before[index], self.after[index], self.decimal_comma, self.padded
-        )
+        return replace(self, before=self.before[index], after=self.after[index])
 
 
 def _among(characters: bytes) -> NDArray[np.bool_]:
@@ -292,8 +312,14 @@ def _plain(text: bytes, begin: int, separator: str, width: int, first: int) -> B
         index = begins[keep][:, np.newaxis] + np.arange(width)
         before, after = before[index], after[index]
     numbers = (np.flatnonzero(keep) + first).tolist()
-    padded = separator != BLANKS and any(text.find(blank, begin) >= 0 for blank in (b" ", b"\t", b"\v", b"\f"))
-    return Body(Slices(buffer, special, before, after, separator != ",", padded), numbers, comments)
+    mixed = separator != "," and text.find(b".", begin) >= 0 and text.find(b",", begin) >= 0
+    padded = separator != BLANKS and any(
+        text.find(blank, begin) >= 0 for blank in (b" ", b"\t", b"\v", b"\f")
+    )
+    if padded and len(before):
+        # Blanks within texts do no harm.
+        padded = bool(_BLANK[buffer[special[before] + 1]].any() or _BLANK[buffer[special[after] - 1]].any())
+    return Body(Slices(buffer, special, before, after, separator != ",", padded, mixed), numbers, comments)
 
 
 def _split_at_marks(

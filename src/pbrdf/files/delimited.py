@@ -173,11 +173,10 @@ class Table:
         DataError
             As :meth:`number`, and if commas mark thousands in one cell and points decimals in another.
         """
-        values, odd = self.body.floats(column)
-        for row in odd.tolist():
-            if math.isnan(values[row]):
-                values[row] = self.number(row, column, missing)
-        if self.decimal_comma:
+        values, odd, empty = self.body.floats(column)
+        for row in np.sort(odd if "" in missing else np.concatenate([odd, empty])).tolist():
+            values[row] = self.number(row, column, missing)
+        if self.body.mixed:
             self._refuse_thousands(column)
         return values
 

@@ -136,15 +136,20 @@ def _parse_block(
     whole = position - start  # digits before the point; without one, all
     whole_end = position
     cursor += pointed
-    exponent: NDArray[np.int64] | int = 0
     digits_end, good = end, cursor == after
-    if not good.all():
-        position = special[cursor]
-        scaled = _EXPONENT[buffer[position]] & ~good
-        if scaled.any():
-            digits_end = np.where(scaled, position, end)
-            exponent, good = _exponents(buffer, words, special, cursor, after, scaled)
-    part = digits_end - whole_end - pointed
+    power = np.zeros(len(end), dtype=np.int64)
+    rest = np.flatnonzero(~good)
+    if rest.size:
+        letter = special[cursor[rest]]
+        scaled = _EXPONENT[buffer[letter]]
+        rest, letter = rest[scaled], letter[scaled]
+        digits_end = end.copy()
+        digits_end[rest] = letter
+        power[rest], good[rest] = _exponents(
+            buffer, words, special, cursor[rest] + 1, after[rest], letter + 1
+        )
+    part = digits_end - whole_end
+    part -= pointed
     good &= (whole + part > 0) & (whole <= 19) & (part <= 24)
     if not good.all():
         whole, part = whole * good, part * good
@@ -158,7 +163,7 @@ def _parse_block(
         if longest + int(whole.max()) > 19:
             good &= (mantissa == 0) | (whole + part <= 19)
         mantissa = mantissa * _INTEGER_POWERS[np.minimum(part, 19)] + fraction
-    values, sure = _scaled(mantissa, exponent - part)
+    values, sure = _scaled(mantissa, power - part)
     if negative is not None:
         np.negative(values, out=values, where=negative)
     good &= sure
@@ -173,19 +178,16 @@ def _exponents(
     special: NDArray[np.intp],
     cursor: NDArray[np.intp],
     after: NDArray[np.intp],
-    scaled: NDArray[np.bool_],
+    begin: NDArray[np.intp],
 ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """Powers of ten where the cursor stands at the letter of one, and which cells end there as they should."""
-    begin = special[cursor] + 1
-    cursor = cursor + scaled
+    """Powers of ten that begin after the letter of one, and which cells end there as they should."""
     position = special[cursor]
     character = buffer[position]
-    signed = scaled & _SIGN[character] & (position == begin) & (cursor < after)
-    cursor += signed
-    good = cursor == after
-    count = (special[after] - begin - signed) * (scaled & good)
-    good &= ~scaled | ((count > 0) & (count <= 8))
-    size = _digits(words, special[after], np.minimum(count, 8))[0].astype(np.int64)
+    signed = _SIGN[character] & (position == begin) & (cursor < after)
+    end = special[after]
+    count = end - begin - signed
+    good = (cursor + signed == after) & (count > 0) & (count <= 8)
+    size = _digits(words, end, count * good)[0].astype(np.int64)
     return np.where(signed & _MINUS[character], -size, size), good
 
 
