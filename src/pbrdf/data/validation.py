@@ -420,6 +420,8 @@ def _physics(ds: xr.Dataset, labels: _Labels) -> Iterator[Issue]:
 
 def _degree_of_polarization(ds: xr.Dataset) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """DoP from what was measured, a lower bound if a channel is missing, and its standard uncertainty."""
+    if not {"Q", "U", "V"} & set(map(str, ds.data_vars)):
+        return np.zeros(ds.sizes[DIMENSION]), np.zeros(ds.sizes[DIMENSION])
     polarized = np.stack([_or_zero(ds, name) for name in ("Q", "U", "V")])
     deviations = np.stack([_or_zero(ds, std_name(name)) for name in ("Q", "U", "V")])
     length = np.linalg.norm(polarized, axis=0)

@@ -124,7 +124,8 @@ class Slices:
         characters = self.buffer[np.minimum(begin[:, np.newaxis] + places, len(self.buffer) - 1)]
         characters[places >= length[:, np.newaxis]] = 0
         cells = characters.view(f"S{widest}").ravel().tolist()
-        return [cell.decode().strip() for cell in cells]
+        known = {cell: cell.decode().strip() for cell in set(cells)}  # labels come many times
+        return [known[cell] for cell in cells]
 
     def floats(self, column: int) -> tuple[NDArray[np.float64], NDArray[np.intp], NDArray[np.intp]]:
         before, after = self.before[:, column], self.after[:, column]
@@ -154,13 +155,13 @@ class Slices:
         """Borders without the blanks at the beginning and the end of each cell."""
         while True:
             inner = before + 1 < after
-            leading = inner & _BLANK[self.buffer[self.special[before] + 1]]
+            leading = inner & _is_blank(self.buffer[self.special[before] + 1])
             if not leading.any():
                 break
             before = before + leading
         while True:
             inner = before + 1 < after
-            closing = inner & _BLANK[self.buffer[self.special[after] - 1]]
+            closing = inner & _is_blank(self.buffer[self.special[after] - 1])
             if not closing.any():
                 return before, after
             after = after - closing
@@ -178,14 +179,13 @@ class Slices:
         return replace(self, before=self.before[index], after=self.after[index])
 
 
-def _among(characters: bytes) -> NDArray[np.bool_]:
-    table = np.zeros(256, dtype=bool)
-    table[np.frombuffer(characters, dtype=np.uint8)] = True
-    return table
+def _is_blank(characters: NDArray[np.uint8]) -> NDArray[np.bool_]:
+    """Whether characters are a space, a tab, \\v or \\f."""
+    return (characters == 32) | (characters == 9) | (characters == 11) | (characters == 12)
 
 
-_BLANK = _among(b" \t\v\f")
-_GAP = _among(b" \t\v\f\n")
+def _is_gap(characters: NDArray[np.uint8]) -> NDArray[np.bool_]:
+    return _is_blank(characters) | (characters == 10)
 
 
 @dataclass(frozen=True)
@@ -276,15 +276,20 @@ def _plain(text: bytes, begin: int, separator: str, width: int, first: int) -> B
     # A line end before the first row, and one after the last.
     buffer[PADDING - 1] = buffer[PADDING + size] = 10
     special = np.flatnonzero((buffer - np.uint8(48)) > 9)
-    split = _split_at_blanks if separator == BLANKS else _split_at_marks
-    before, after, begins, counts = split(buffer, special, separator)
+    characters = buffer[special]
+    lines = np.flatnonzero(characters == 10)
+    if separator == BLANKS:
+        before, after = _between_blanks(special, characters)
+        firsts = np.searchsorted(before, lines)
+    else:
+        borders = np.flatnonzero((characters == ord(separator)) | (characters == 10))
+        before, after = borders[:-1], borders[1:]
+        firsts = np.flatnonzero(characters[borders] == 10)
+    begins, counts = firsts[:-1], np.diff(firsts)
     # Position of each line's end, to read single lines by.
-    lines = np.flatnonzero(buffer[special] == 10)
     edges = special[lines]
 
-    odd_starts = (
-        _among(b"#%/!;" + separator.encode() + b" \t\v\f\n") if separator != BLANKS else _among(b"#%/!;")
-    )
+    marks = b"#%/!;" if separator == BLANKS else b"#%/!; \t\v\f\n" + separator.encode()
     if separator == BLANKS:
         at = np.minimum(begins, max(len(before) - 1, 0))
         start = buffer[special[before[at]] + 1] if len(before) else np.zeros(len(counts), dtype=np.uint8)
@@ -292,7 +297,7 @@ def _plain(text: bytes, begin: int, separator: str, width: int, first: int) -> B
         start = buffer[edges[:-1] + 1]
     keep = counts == width
     comments = []
-    for line in np.flatnonzero(~keep | odd_starts[start]).tolist():
+    for line in np.flatnonzero(~keep | np.isin(start, np.frombuffer(marks, dtype=np.uint8))).tolist():
         whole = buffer[edges[line] + 1 : edges[line + 1]].tobytes().decode()
         keep[line] = False
         if not whole.strip():
@@ -318,27 +323,16 @@ def _plain(text: bytes, begin: int, separator: str, width: int, first: int) -> B
     )
     if padded and len(before):
         # Blanks within texts do no harm.
-        padded = bool(_BLANK[buffer[special[before] + 1]].any() or _BLANK[buffer[special[after] - 1]].any())
+        padded = bool(
+            _is_blank(buffer[special[before] + 1]).any() or _is_blank(buffer[special[after] - 1]).any()
+        )
     return Body(Slices(buffer, special, before, after, separator != ",", padded, mixed), numbers, comments)
 
 
-def _split_at_marks(
-    buffer: NDArray[np.uint8], special: NDArray[np.intp], separator: str
-) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
-    """Borders of all cells, the index of each line's first cell, and how many cells each line has."""
-    characters = buffer[special]
-    borders = np.flatnonzero((characters == ord(separator)) | (characters == 10))
-    ends = np.flatnonzero(characters[borders] == 10)
-    return borders[:-1], borders[1:], ends[:-1], np.diff(ends)
-
-
-def _split_at_blanks(
-    buffer: NDArray[np.uint8], special: NDArray[np.intp], separator: str
-) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
-    """As :func:`_split_at_marks`, at spaces and tabs."""
-    gap = _GAP[buffer[special]]
-    # The first special character is the line end before the text, the last that after it.
-    before = np.flatnonzero(gap & ~_GAP[buffer[special + 1]])[:-1]
-    after = np.flatnonzero(gap & ~_GAP[buffer[special - 1]])[1:]
-    begins = np.searchsorted(before, np.flatnonzero(buffer[special] == 10))
-    return before, after, begins[:-1], np.diff(begins)
+def _between_blanks(
+    special: NDArray[np.intp], characters: NDArray[np.uint8]
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Which special characters stand before and after each cell between spaces, tabs and line ends."""
+    gaps = np.flatnonzero(_is_gap(characters))
+    apart = np.diff(special[gaps]) > 1
+    return gaps[:-1][apart], gaps[1:][apart]

@@ -29,6 +29,7 @@ _COMMA = re.compile(r"[-+]?(?:[0-9]+(?:,[0-9]*)?|,[0-9]+)(?:[eEdD][-+]?[0-9]+)?"
 _WORD = re.compile(r"[-+]?(?:nan|inf|infinity)", re.IGNORECASE)
 
 _BLOCK = 2**15
+_PLUS, _COMMA_SIGN, _MINUS, _POINT, _D, _E = (np.uint8(code) for code in b"+,-.de")
 _SCALE = 44  # 10^44 is the sum of two doubles, exactly
 _POWERS = np.array([float(10**k) for k in range(_SCALE + 1)])
 _POWERS_REST = np.array([float(10**k - int(float(10**k))) for k in range(_SCALE + 1)])
@@ -91,24 +92,13 @@ def parse_cells(
     values = np.empty(len(before))
     odd = []
     words = np.ndarray((len(buffer) - 7,), dtype="<u8", buffer=buffer, strides=(1,))
-    points = b".," if decimal_comma else b"."
-    is_point = _among(points)
     for begin in range(0, len(before), _BLOCK):
         block = slice(begin, begin + _BLOCK)
-        found, good = _parse_block(buffer, words, special, before[block], after[block], is_point)
+        found, good = _parse_block(buffer, words, special, before[block], after[block], decimal_comma)
         values[block] = found
         if not good.all():
             odd.append(begin + np.flatnonzero(~good))
     return values, np.concatenate(odd) if odd else np.empty(0, dtype=np.intp)
-
-
-def _among(characters: bytes) -> NDArray[np.bool_]:
-    table = np.zeros(256, dtype=bool)
-    table[np.frombuffer(characters, dtype=np.uint8)] = True
-    return table
-
-
-_SIGN, _MINUS, _EXPONENT = _among(b"+-"), _among(b"-"), _among(b"eEdD")
 
 
 def _parse_block(
@@ -117,22 +107,25 @@ def _parse_block(
     special: NDArray[np.intp],
     before: NDArray[np.intp],
     after: NDArray[np.intp],
-    is_point: NDArray[np.bool_],
+    decimal_comma: bool,
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     start, end = special[before] + 1, special[after]
     # The cursor walks over the special characters of each cell: sign, point, exponent, its sign.
     cursor = before + 1
     position = special[cursor]
     character = buffer[position]
-    signed = _SIGN[character] & (position == start) & (cursor < after)
+    signed = _is_sign(character)
     negative = None
     if signed.any():
-        negative = signed & _MINUS[character]
+        signed &= position == start
+        negative = signed & (character == _MINUS)
         start += signed
         cursor += signed
         position = special[cursor]
         character = buffer[position]
-    pointed = is_point[character] & (cursor < after)
+    pointed = character == _POINT
+    if decimal_comma:
+        pointed |= character == _COMMA_SIGN
     whole = position - start  # digits before the point; without one, all
     whole_end = position
     cursor += pointed
@@ -141,7 +134,8 @@ def _parse_block(
     rest = np.flatnonzero(~good)
     if rest.size:
         letter = special[cursor[rest]]
-        scaled = _EXPONENT[buffer[letter]]
+        lower = buffer[letter] | 0x20
+        scaled = (lower == _E) | (lower == _D)
         rest, letter = rest[scaled], letter[scaled]
         digits_end = end.copy()
         digits_end[rest] = letter
@@ -183,12 +177,16 @@ def _exponents(
     """Powers of ten that begin after the letter of one, and which cells end there as they should."""
     position = special[cursor]
     character = buffer[position]
-    signed = _SIGN[character] & (position == begin) & (cursor < after)
+    signed = _is_sign(character) & (position == begin)
     end = special[after]
     count = end - begin - signed
     good = (cursor + signed == after) & (count > 0) & (count <= 8)
     size = _digits(words, end, count * good)[0].astype(np.int64)
-    return np.where(signed & _MINUS[character], -size, size), good
+    return np.where(signed & (character == _MINUS), -size, size), good
+
+
+def _is_sign(character: NDArray[np.uint8]) -> NDArray[np.bool_]:
+    return (character == _MINUS) | (character == _PLUS)
 
 
 def _digits(
