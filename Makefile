@@ -33,6 +33,7 @@ benchmark: $(TEST_STAMP)
 	$(BIN)/python benchmarks/virtual_experiments.py
 	$(BIN)/python benchmarks/coverage.py
 	$(BIN)/python benchmarks/rendering.py
+	$(BIN)/python benchmarks/read_csv.py
 
 $(VENV)/bin/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
