@@ -34,8 +34,17 @@ _SCALE = 44  # 10^44 is the sum of two doubles, exactly
 _POWERS = np.array([float(10**k) for k in range(_SCALE + 1)])
 _POWERS_REST = np.array([float(10**k - int(float(10**k))) for k in range(_SCALE + 1)])
 _INTEGER_POWERS = np.array([10**k for k in range(20)], dtype=np.uint64)
-#: Of eight characters read as one integer, little-endian, those that leave the last n.
-_LAST = np.array([(2**64 - 1) ^ (2 ** (8 * (8 - n)) - 1) for n in range(9)], dtype=np.uint64)
+#: Of 8, 16 or 24 characters read as integers, little-endian, those of the last n.
+_LAST = {
+    many: np.array(
+        [
+            [(2**64 - 1) << 8 * min(max(8 * (k + 1) - n, 0), 8) & (2**64 - 1) for k in range(many)][::-1]
+            for n in range(8 * many + 1)
+        ],
+        dtype=np.uint64,
+    )
+    for many in (1, 2, 3)
+}
 #: Bytes that must stand before and after the text that :func:`parse_cells` reads.
 PADDING = 32
 
@@ -91,10 +100,9 @@ def parse_cells(
     """
     values = np.empty(len(before))
     odd = []
-    words = np.ndarray((len(buffer) - 7,), dtype="<u8", buffer=buffer, strides=(1,))
     for begin in range(0, len(before), _BLOCK):
         block = slice(begin, begin + _BLOCK)
-        found, good = _parse_block(buffer, words, special, before[block], after[block], decimal_comma)
+        found, good = _parse_block(buffer, special, before[block], after[block], decimal_comma)
         values[block] = found
         if not good.all():
             odd.append(begin + np.flatnonzero(~good))
@@ -103,7 +111,6 @@ def parse_cells(
 
 def _parse_block(
     buffer: NDArray[np.uint8],
-    words: NDArray[np.uint64],
     special: NDArray[np.intp],
     before: NDArray[np.intp],
     after: NDArray[np.intp],
@@ -139,20 +146,18 @@ def _parse_block(
         rest, letter = rest[scaled], letter[scaled]
         digits_end = end.copy()
         digits_end[rest] = letter
-        power[rest], good[rest] = _exponents(
-            buffer, words, special, cursor[rest] + 1, after[rest], letter + 1
-        )
+        power[rest], good[rest] = _exponents(buffer, special, cursor[rest] + 1, after[rest], letter + 1)
     part = digits_end - whole_end
     part -= pointed
     good &= (whole + part > 0) & (whole <= 19) & (part <= 24)
     if not good.all():
         whole, part = whole * good, part * good
 
-    mantissa, fits = _joined(_digits(words, whole_end, whole))
+    mantissa, fits = _integers(buffer, whole_end, whole)
     good &= fits
     longest = int(part.max(initial=0))
     if longest:
-        fraction, fits = _joined(_digits(words, digits_end, part))
+        fraction, fits = _integers(buffer, digits_end, part)
         good &= fits
         if longest + int(whole.max()) > 19:
             good &= (mantissa == 0) | (whole + part <= 19)
@@ -168,7 +173,6 @@ def _parse_block(
 
 def _exponents(
     buffer: NDArray[np.uint8],
-    words: NDArray[np.uint64],
     special: NDArray[np.intp],
     cursor: NDArray[np.intp],
     after: NDArray[np.intp],
@@ -181,7 +185,7 @@ def _exponents(
     end = special[after]
     count = end - begin - signed
     good = (cursor + signed == after) & (count > 0) & (count <= 8)
-    size = _digits(words, end, count * good)[0].astype(np.int64)
+    size = _integers(buffer, end, count * good)[0].astype(np.int64)
     return np.where(signed & (character == _MINUS), -size, size), good
 
 
@@ -189,39 +193,27 @@ def _is_sign(character: NDArray[np.uint8]) -> NDArray[np.bool_]:
     return (character == _MINUS) | (character == _PLUS)
 
 
-def _digits(
-    words: NDArray[np.uint64], end: NDArray[np.intp], count: NDArray[np.intp]
-) -> list[NDArray[np.uint64]]:
-    """The `count` digits that end before `end`, eight a number, the last ones first."""
-    found = []
-    longest = int(count.max(initial=0))
-    for done in range(0, max(longest, 1), 8):
-        valid = count - done if done or longest > 8 else count
-        if done or longest > 8:
-            np.clip(valid, 0, 8, out=valid)
-        w = words[end - (done + 8)]
-        w &= _LAST[valid]
-        w &= np.uint64(0x0F0F0F0F0F0F0F0F)
-        w *= np.uint64(10 * 2**8 + 1)
-        w >>= np.uint64(8)
-        w &= np.uint64(0x00FF00FF00FF00FF)
-        w *= np.uint64(100 * 2**16 + 1)
-        w >>= np.uint64(16)
-        w &= np.uint64(0x0000FFFF0000FFFF)
-        w *= np.uint64(10000 * 2**32 + 1)
-        w >>= np.uint64(32)
-        found.append(w)
-    return found
-
-
-def _joined(parts: list[NDArray[np.uint64]]) -> tuple[NDArray[np.uint64], NDArray[np.bool_] | bool]:
-    """One integer below 10¹⁹ of groups of eight digits, and where it is."""
-    total = parts[0]
-    fits: NDArray[np.bool_] | bool = True
-    for k, part in enumerate(parts[1:], 1):
-        total = total + part * np.uint64(10 ** (8 * k))
-        fits = part < 1000 if k == 2 else fits
-    return total, fits
+def _integers(
+    buffer: NDArray[np.uint8], end: NDArray[np.intp], count: NDArray[np.intp]
+) -> tuple[NDArray[np.uint64], NDArray[np.bool_] | bool]:
+    """The integers of the `count` digits (24 or fewer) that end before `end`, and which are below 10¹⁹."""
+    many = max(1, -(-int(count.max(initial=0)) // 8))
+    places = np.ndarray((len(buffer) - 8 * many + 1,), dtype=f"V{8 * many}", buffer=buffer, strides=(1,))
+    w = places[end - 8 * many].view("<u8").reshape(-1, many)
+    w &= _LAST[many].take(count, axis=0)
+    w &= np.uint64(0x0F0F0F0F0F0F0F0F)
+    w *= np.uint64(10 * 2**8 + 1)
+    w >>= np.uint64(8)
+    w &= np.uint64(0x00FF00FF00FF00FF)
+    w *= np.uint64(100 * 2**16 + 1)
+    w >>= np.uint64(16)
+    w &= np.uint64(0x0000FFFF0000FFFF)
+    w *= np.uint64(10000 * 2**32 + 1)
+    w >>= np.uint64(32)
+    total = w[:, -1]
+    for k in range(1, many):
+        total = total + w[:, -1 - k] * np.uint64(10 ** (8 * k))
+    return total, w[:, 0] < 1000 if many == 3 else True
 
 
 def _scaled(
