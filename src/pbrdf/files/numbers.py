@@ -15,7 +15,9 @@ Math. 18, 224 (1971)), and the few results that lie too near to the middle betwe
 from __future__ import annotations
 
 import math
+import os
 import re
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +31,7 @@ _COMMA = re.compile(r"[-+]?(?:[0-9]+(?:,[0-9]*)?|,[0-9]+)(?:[eEdD][-+]?[0-9]+)?"
 _WORD = re.compile(r"[-+]?(?:nan|inf|infinity)", re.IGNORECASE)
 
 _BLOCK = 2**15
+_THREADS = min(4, os.cpu_count() or 1)
 _PLUS, _COMMA_SIGN, _MINUS, _POINT, _D, _E = (np.uint8(code) for code in b"+,-.de")
 _SCALE = 44  # 10^44 is the sum of two doubles, exactly
 _POWERS = np.array([float(10**k) for k in range(_SCALE + 1)])
@@ -99,14 +102,19 @@ def parse_cells(
         Which are not: no numbers at all, or of a rare form.
     """
     values = np.empty(len(before))
-    odd = []
-    for begin in range(0, len(before), _BLOCK):
+
+    def parse(begin: int) -> NDArray[np.intp]:
         block = slice(begin, begin + _BLOCK)
-        found, good = _parse_block(buffer, special, before[block], after[block], decimal_comma)
-        values[block] = found
-        if not good.all():
-            odd.append(begin + np.flatnonzero(~good))
-    return values, np.concatenate(odd) if odd else np.empty(0, dtype=np.intp)
+        values[block], good = _parse_block(buffer, special, before[block], after[block], decimal_comma)
+        return begin + np.flatnonzero(~good)
+
+    begins = range(0, len(before), _BLOCK)
+    if len(begins) < 3:
+        odd = [parse(begin) for begin in begins]
+    else:  # NumPy works on several blocks at once
+        with ThreadPoolExecutor(min(_THREADS, len(begins))) as pool:
+            odd = list(pool.map(parse, begins))
+    return values, np.concatenate([*odd, np.empty(0, dtype=np.intp)])
 
 
 def _parse_block(
