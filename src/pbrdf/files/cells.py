@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrdf.files.layout import BLANKS, kept_comment, split_records
+from pbrdf.files.layout import BLANKS, kept_comment, split_records, words
 from pbrdf.files.numbers import PADDING, parse_cells, to_number
 
 __all__ = ["Body", "Cells", "RaggedRowError", "read_body"]
@@ -306,7 +306,7 @@ def _plain(text: bytes, begin: int, separator: str, width: int, first: int) -> B
         if said is not None:
             comments.append((first + line, said))
             continue
-        cells = whole.split() if separator == BLANKS else [cell.strip() for cell in whole.split(separator)]
+        cells = words(whole) if separator == BLANKS else [cell.strip() for cell in whole.split(separator)]
         if any(cells):
             _fit(cells, width, first + line)
             keep[line] = True

@@ -269,6 +269,7 @@ def read_table(path: Path, sheet: str | None = None) -> Table:
 def _table(path: Path, text: bytes, separators: Sequence[str], sheet: str = "") -> Table:
     """The table that a text in UTF-8 is."""
     origin = _origin(path, sheet)
+    text = _plain_blanks(text)
     lines = _head_lines(text)
     if lines and lines[0].lstrip().startswith(("<?xml", "<html", "<!DOCTYPE", "<table")):
         raise DataError(f"{origin}: line 1: this is XML or HTML; save it as CSV or as a workbook")
@@ -316,6 +317,14 @@ def _table(path: Path, text: bytes, separators: Sequence[str], sheet: str = "") 
     return table
 
 
+def _plain_blanks(text: bytes) -> bytes:
+    """A text with plain spaces for those that do not break or are narrow."""
+    if not text.isascii():
+        for space in "\u00a0\u2007\u2009\u202f":
+            text = text.replace(space.encode(), b" ")
+    return text
+
+
 def _head_lines(text: bytes) -> list[str]:
     """Lines of the beginning of a text, all of them whole."""
     head = text[:_HEAD]
@@ -357,7 +366,7 @@ def column_names(path: Path) -> list[str]:
         return []
     try:
         text = utf8(path, raw)
-        return find_layout(path, _head_lines(text + b"\n" if len(raw) < _HEAD else text)).names
+        return find_layout(path, _head_lines(_plain_blanks(text))).names
     except DataError:
         return []
 

@@ -27,6 +27,7 @@ __all__ = [
     "find_layout",
     "kept_comment",
     "split_records",
+    "words",
 ]
 
 #: Stands for one or several spaces or tabs.
@@ -35,6 +36,7 @@ SEPARATORS = (",", ";", "\t", BLANKS)
 
 #: What a spreadsheet writes for a cell in error begins with the mark of a comment, too.
 _COMMENT = re.compile(r"\s*(?!#(?:N/A|[A-Z]+(?:/0)?[!?]))(?:#|%|//|!|;)+(.*)", re.DOTALL)
+_BLANKS = re.compile(r"[ \t\v\f\n]+")
 _QUOTED = re.compile(r'"[^"]*"')
 _NO_NAMES = "there is no line of column names"
 _FIRST, _SCANNED = 30, 500
@@ -143,7 +145,7 @@ def split_records(lines: Sequence[str], separator: str, first: int = 0) -> Itera
     # Comments become empty lines, which keeps the numbers of the lines right.
     text = ("\n" if comment_of(line, separator) is not None else line + "\n" for line in lines)
     if blank:
-        text = (" ".join(line.split()) + "\n" for line in text)
+        text = (" ".join(words(line)) + "\n" for line in text)
     reader = csv.reader(text, delimiter=separator, skipinitialspace=True)
     begin = first
     while True:
@@ -162,6 +164,11 @@ def split_records(lines: Sequence[str], separator: str, first: int = 0) -> Itera
         if any(cells):
             yield Record(begin, after, cells)
         begin = after
+
+
+def words(line: str) -> list[str]:
+    """What stands between the blanks of a line."""
+    return [word for word in _BLANKS.split(line) if word]
 
 
 def find_layout(path: Path, lines: Sequence[str], separators: Sequence[str] = SEPARATORS) -> Layout:

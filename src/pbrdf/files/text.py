@@ -47,6 +47,8 @@ def utf8(path: Path, raw: bytes) -> bytes:
     encoding = "utf-8" if raw.isascii() and b"\0" not in raw else _encoding(raw)
     if encoding == "utf-8":
         text = raw.removeprefix(codecs.BOM_UTF8)
+        if text and text[-1] >= 0x80:  # perhaps within a character
+            text = text.decode(errors="replace").encode()
     else:
         text = raw.decode(encoding, errors="replace").removeprefix("\ufeff").encode()
     if not text.isascii() or b"\0" in text:
