@@ -162,17 +162,19 @@ def _parse_block(
         whole, part = whole * good, part * good
 
     mantissa, fits = _integers(buffer, whole_end, whole)
-    good &= fits
+    if fits is not True:
+        good &= fits
     longest = int(part.max(initial=0))
     if longest:
         fraction, fits = _integers(buffer, digits_end, part)
-        good &= fits
+        if fits is not True:
+            good &= fits
         if longest + int(whole.max()) > 19:
             good &= (mantissa == 0) | (whole + part <= 19)
         mantissa = mantissa * _INTEGER_POWERS[np.minimum(part, 19)] + fraction
     values, sure = _scaled(mantissa, power - part)
     if negative is not None:
-        np.negative(values, out=values, where=negative)
+        values *= 1.0 - 2.0 * negative
     good &= sure
     if not good.all():
         values[~good] = np.nan
@@ -205,7 +207,10 @@ def _integers(
     buffer: NDArray[np.uint8], end: NDArray[np.intp], count: NDArray[np.intp]
 ) -> tuple[NDArray[np.uint64], NDArray[np.bool_] | bool]:
     """The integers of the `count` digits (24 or fewer) that end before `end`, and which are below 10¹⁹."""
-    many = max(1, -(-int(count.max(initial=0)) // 8))
+    longest = int(count.max(initial=0))
+    if longest <= 1:
+        return (buffer[end - 1] & np.uint8(0x0F)) * count.astype(np.uint64), True
+    many = -(-longest // 8)
     places = np.ndarray((len(buffer) - 8 * many + 1,), dtype=f"V{8 * many}", buffer=buffer, strides=(1,))
     w = places[end - 8 * many].view("<u8").reshape(-1, many)
     w &= _LAST[many].take(count, axis=0)
