@@ -37,6 +37,10 @@ LAYOUTS = {
     "tabs and blanks": "theta_i\ttheta_r phi  \tbrdf\n" + rows(" \t"),
     "aligned by blanks, separated by commas": "theta_i, theta_r,  phi,  brdf\n" + rows(" , "),
     "commas in names, blanks in rows": "# theta_i, theta_r, phi, brdf\n" + rows(" "),
+    "blanks in names, commas in rows": "theta_i theta_r phi brdf\n" + rows(","),
+    "tabs in names, blanks in rows": "theta_i\ttheta_r\tphi\tbrdf\n" + rows("   "),
+    "commas in names, tabs in rows": "Lamp 3\ntheta_i, theta_r, phi, brdf\n" + rows("\t"),
+    "units in words": "theta_i,theta_r,phi,brdf\nDegrees,Degrees,Degrees,per sr\n" + rows(","),
     "numpy.savetxt": "# theta_i,theta_r,phi,brdf\n" + rows(","),
     "names in a comment of Matlab": "% measured in May\n% theta_i theta_r phi brdf\n" + rows(" "),
     "names in a comment of C": "// theta_i;theta_r;phi;brdf\n" + rows(";"),
@@ -176,6 +180,16 @@ def test_names_with_blanks_in_tables_separated_by_blanks(table):
     assert table("Incident Zenith   Viewing Zenith   BRF\n 30   20   0.1\n").names == [
         "Incident Zenith", "Viewing Zenith", "BRF",
     ]  # fmt: skip
+
+
+def test_rows_that_R_numbers(table):
+    found = table('"theta_i" "brdf"\n"1" 30 0.5\n"2" 40 0.25\n')
+    assert found.names == ["", "theta_i", "brdf"]
+    assert found.numbers(2).tolist() == [0.5, 0.25]
+
+
+def test_names_over_several_lines_of_a_cell(table):
+    assert table('"theta_i\n[deg]",brdf\n30,0.5\n').names == ["theta_i [deg]", "brdf"]
 
 
 def test_rows_of_text_are_rows(table):

@@ -58,7 +58,7 @@ def test_what_is_no_number(text, tmp_path):
 
 
 def test_not_a_number_is_a_number():
-    for text in ("nan", "NaN", "-nan"):
+    for text in ("nan", "NaN", "-nan", "-nan(ind)", "1.#QNAN", "-1.#IND"):
         assert math.isnan(to_number(text))
 
 

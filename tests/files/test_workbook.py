@@ -164,8 +164,15 @@ def test_several_sheets_with_numbers_are_asked_for(tmp_path):
         DataError, match=r"t\.xlsx: the sheets 'white', 'black' all hold numbers; name one with sheet"
     ):
         read(path)
+    write_xlsx(path, {"white": TABLE, "ranges": [["from 0 to", 90.0], [0.0, 90.0]], "black": other})
+    with pytest.raises(DataError, match="the sheets 'white', 'black' all hold numbers"):
+        read(path)
+    write_xlsx(tmp_path / "one.xlsx", {"ranges": [[0.0, 90.0], [0.0, 90.0]], "black": other})
+    assert read(tmp_path / "one.xlsx")["I"].values.tolist() == [0.9]
     assert read(path, sheet="black")["I"].values.tolist() == [0.9]
-    with pytest.raises(DataError, match="there is no sheet 'grey'; the sheets are 'white', 'black'"):
+    with pytest.raises(
+        DataError, match="there is no sheet 'grey'; the sheets are 'white', 'ranges', 'black'"
+    ):
         read(path, sheet="grey")
     (tmp_path / "t.csv").write_text("theta_i,theta_r,brdf\n30,20,0.5\n")
     with pytest.raises(DataError, match=r"t\.csv: this is a text, which has no sheets"):

@@ -12,6 +12,7 @@ is. The sheet of a workbook (``.xlsx``, ``.xls``, ``.ods``, …) is a table, too
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import math
 import re
@@ -28,7 +29,7 @@ from pbrdf.files.cells import Cells, RaggedRowError, read_body
 from pbrdf.files.layout import SEPARATORS, OpenQuotationError, comment_of, find_layout, kept_comment
 from pbrdf.files.numbers import to_number
 from pbrdf.files.text import first_bytes, read_bytes, utf8
-from pbrdf.files.workbook import is_workbook, sheet_lines
+from pbrdf.files.workbook import is_workbook, sheet_texts
 
 __all__ = ["TABLE_EXTENSIONS", "Row", "Table", "column_names", "read_table", "write_table"]
 
@@ -259,11 +260,27 @@ def read_table(path: Path, sheet: str | None = None) -> Table:
     """
     raw = read_bytes(path)
     if is_workbook(raw):
-        name, text = sheet_lines(path, raw, sheet)
-        return _table(path, text, ("\t",), name)
+        texts = sheet_texts(path, raw, sheet)
+        name = next(iter(texts)) if len(texts) == 1 else _only_table(path, texts)
+        return _table(path, texts[name], ("\t",), name)
     if sheet is not None:
         raise DataError(f"{path}: this is a text, which has no sheets; leave out sheet={sheet!r}")
     return _table(path, utf8(path, raw), SEPARATORS)
+
+
+def _only_table(path: Path, texts: Mapping[str, bytes]) -> str:
+    """The only sheet that has names above numbers."""
+    found = []
+    for name, text in texts.items():
+        with contextlib.suppress(DataError):
+            find_layout(path, _head_lines(text), ("\t",))
+            found.append(name)
+    if len(found) == 1:
+        return found[0]
+    raise DataError(
+        f"{path}: the sheets {', '.join(map(repr, found or texts))} all hold numbers; name one with "
+        "sheet=… (--sheet), or keep only one of them in the file"
+    )
 
 
 def _table(path: Path, text: bytes, separators: Sequence[str], sheet: str = "") -> Table:

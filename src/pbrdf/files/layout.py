@@ -44,10 +44,11 @@ _LOOKED_AT = 20
 _MISSING = frozenset(("", "nan", "na", "n/a", "-", "--", "none", "null"))
 #: Units, in lower case without blanks, that are no names of columns, and those that may be.
 _UNIT = re.compile(
-    r"deg\.?|degrees?|[°º]|m?rad|radians?|nm|[uµμ]m|m?sr|(1?/|)m?sr(\^?-1|⁻¹)?|%|percent|a\.u\.|arb\.u(nits)?\.?|"
+    r"deg\.?|degrees?|[°º]|m?rad|radians?|nm|[uµμ]m|(1?/|per|)(m?sr|steradian)(\^?\{?-1\}?|⁻¹)?|%|percent|a\.u\.|"
+    r"arb\.u(nits)?\.?|unitless|dimensionless|"
     r"w[/·*].*sr.*|w/(m2|m\^2|m²)|[uµμm][wvs]|[\[(<].*[\])>]"
 )
-_PERHAPS_UNIT = re.compile(r"[cm]?m|s|au|arb\.?|arbitrary|counts?|cts|adu|dn|[vwkc]|°c|k?hz|cps")
+_PERHAPS_UNIT = re.compile(r"none|[cm]?m|s|au|arb\.?|arbitrary|counts?|cts|adu|dn|[vwkc]|°c|k?hz|cps")
 _TITLED = re.compile(r"\s*(?:columns?|fields?|names?|headers?|column names)\s*[:=]\s*", re.IGNORECASE)
 
 
@@ -196,6 +197,8 @@ def find_layout(path: Path, lines: Sequence[str], separators: Sequence[str] = SE
         # A plain table shows itself early; remarks before the names may be long.
         if layout is not None and (many == _SCANNED or not layout.remarks):
             return layout
+    if found and (layout := _separated_otherwise(lines, max(found, key=lambda c: c.score))) is not None:
+        return layout
     first = next((line for line in lines if line.strip() and comment_of(line, "") is None), None)
     if first is None:
         raise DataError(f"{path}: {_NO_NAMES}")
@@ -262,6 +265,7 @@ def _are_units(cells: Sequence[str]) -> bool:
 class _Candidate:
     """Rows of numbers with one separator and width: how many numbers, where the first is, and their header if any."""
 
+    separator: str
     score: int
     width: int
     first: int
@@ -277,7 +281,7 @@ def _candidates(lines: Sequence[str], separator: str, many: int) -> Iterator[_Ca
     for width, score in scores.most_common(3):
         if score:
             first, layout = _with_header(lines, separator, records, kinds, width)
-            yield _Candidate(score, width, records[first].line, layout)
+            yield _Candidate(separator, score, width, records[first].line, layout)
 
 
 def _with_header(
@@ -295,6 +299,8 @@ def _with_header(
     if not rows:
         return numeric[0], None
     trailing = width > 1 and all(not records[i].cells[-1] for i in numeric)
+    # R numbers the rows, and has no name for that.
+    numbered = separator == BLANKS and all(records[i].cells[0] == str(k) for k, i in enumerate(rows, 1))
     data = rows[0]
     while data and len(kinds[data - 1]) == width and not strange(data - 1):
         data -= 1
@@ -302,6 +308,8 @@ def _with_header(
     stack: dict[int, list[str]] = {}
     for i in range(data - 1, -1, -1):
         cells = _as_names(lines, records[i], separator, width, trailing)
+        if cells is None and numbered and len(records[i].cells) == width - 1:
+            cells = ["", *records[i].cells]
         if cells is None:
             break
         stack[i] = cells
@@ -338,12 +346,27 @@ def _with_header(
     passed = [i for i in range(body) if i not in (names, row_of_units)]
     return data, Layout(
         separator,
-        stack[names],
+        [" ".join(name.split()) for name in stack[names]],
         records[names].line + 1,
         records[body - 1].following,
         said,
         remarks=[(records[i].line + 1, _remark(lines, records[i], separator)) for i in passed],
     )
+
+
+def _separated_otherwise(lines: Sequence[str], rows: _Candidate) -> Layout | None:
+    """The layout where the names stand directly above the rows, separated by something else."""
+    above = [
+        i for i in range(rows.first) if lines[i].strip() and comment_of(lines[i], rows.separator) is None
+    ]
+    if not above or rows.width == 1:
+        return None
+    for choice in SEPARATORS:
+        cells = None if choice == rows.separator else _comment_cells(lines[above[-1]], choice, rows.width)
+        if cells is not None and all(cells) and set(_kinds(cells, choice)) == {"t"}:
+            remarks = [(i + 1, lines[i].strip()) for i in above[:-1]]
+            return Layout(rows.separator, cells, above[-1] + 1, rows.first, remarks=remarks)
+    return None
 
 
 def _as_names(
@@ -363,11 +386,10 @@ def _as_names(
 
 def _splittings(line: str, cells: list[str], separator: str) -> Iterator[list[str]]:
     """Cells of a line; with blanks as separators also as names that have blanks within them."""
-    yield cells
-    if separator == BLANKS:
-        plain = [cell.rstrip(",;") for cell in cells]
-        if plain != cells:
-            yield plain
+    if separator != BLANKS:
+        yield cells
+    else:
+        yield [cell.rstrip(",;") for cell in cells]
         yield re.findall(r"\S+(?:\s+[\[(][^\])]*[\])])?", line)
         yield re.split(r"\s{2,}|\t", line.strip())
 

@@ -28,7 +28,8 @@ __all__ = ["parse_cells", "to_number"]
 _LONGEST = 400
 _NUMBER = re.compile(r"[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eEdD][-+]?[0-9]+)?")
 _COMMA = re.compile(r"[-+]?(?:[0-9]+(?:,[0-9]*)?|,[0-9]+)(?:[eEdD][-+]?[0-9]+)?")
-_WORD = re.compile(r"[-+]?(?:nan|inf|infinity)", re.IGNORECASE)
+#: The last form of nan is that of Microsoft's compilers.
+_WORD = re.compile(r"[-+]?(?:inf|infinity|nan(?:\((?:ind|snan)\))?|1\.#(?:QNAN|SNAN|IND))", re.IGNORECASE)
 
 _BLOCK = 2**15
 _THREADS = min(4, os.cpu_count() or 1)
@@ -67,7 +68,7 @@ def to_number(text: str, decimal_comma: bool = False) -> float | None:
         return None
     if not _NUMBER.fullmatch(text):
         if _WORD.fullmatch(text):
-            return math.copysign(float(text.lstrip("+-")), -1.0 if text[0] == "-" else 1.0)
+            return float(text) if text.lstrip("+-")[0] in "iI" else math.nan
         if not (decimal_comma and _COMMA.fullmatch(text)):
             return None
         text = text.replace(",", ".")

@@ -20,8 +20,9 @@ from typing import Any
 from xml.etree import ElementTree
 
 from pbrdf.errors import DataError
+from pbrdf.files.numbers import to_number
 
-__all__ = ["is_workbook", "sheet_lines"]
+__all__ = ["is_workbook", "sheet_texts"]
 
 _ZIP = b"PK\x03\x04"
 _COMPOUND = bytes.fromhex("d0cf11e0a1b11ae1")
@@ -40,8 +41,8 @@ def is_workbook(raw: bytes) -> bool:
     return raw.startswith((_ZIP, _COMPOUND))
 
 
-def sheet_lines(path: Path, raw: bytes, sheet: str | None) -> tuple[str, bytes]:
-    """A sheet as text.
+def sheet_texts(path: Path, raw: bytes, sheet: str | None) -> dict[str, bytes]:
+    """Sheets as text, by name.
 
     Parameters
     ----------
@@ -50,19 +51,17 @@ def sheet_lines(path: Path, raw: bytes, sheet: str | None) -> tuple[str, bytes]:
     raw
         Its content.
     sheet
-        Its name; by default the only sheet with numbers.
+        The only one wanted; by default all that have numbers.
 
     Returns
     -------
-    name
-        Of the sheet.
-    text
-        UTF-8, a line a row, cells separated by tabs.
+    dict
+        UTF-8, a line a row, cells separated by tabs; at least one.
 
     Raises
     ------
     DataError
-        If it cannot be read, there is no such sheet, none with numbers, or several and none is named.
+        If it cannot be read, there is no such sheet, or none with numbers.
     """
     archive = _archive(path, raw) if raw.startswith(_ZIP) else None
     workbook = _guarded(path, _opened, raw)
@@ -79,17 +78,11 @@ def sheet_lines(path: Path, raw: bytes, sheet: str | None) -> tuple[str, bytes]:
             raise DataError(
                 f"{path}: there is no sheet {sheet!r}; the sheets are {', '.join(map(repr, names))}"
             )
-        return sheet, _text(cells(sheet))
+        return {sheet: _text(cells(sheet))}
     found = [(name, there) for name in names if _numbers(there := cells(name))]
     if not found:
         raise DataError(f"{path}: no sheet holds numbers")
-    if len(found) > 1:
-        raise DataError(
-            f"{path}: the sheets {', '.join(repr(name) for name, _ in found)} all hold numbers; name one with "
-            "sheet=… (--sheet), or keep only one of them in the file"
-        )
-    name, there = found[0]
-    return name, _text(there)
+    return {name: _text(there) for name, there in found}
 
 
 def _archive(path: Path, raw: bytes) -> zipfile.ZipFile:
@@ -194,7 +187,9 @@ def _guarded(path: Path, call: Any, *values: Any) -> Any:
 
 def _numbers(cells: Sequence[Sequence[Any]]) -> bool:
     """Whether there is a number in two cells of a row: a table, not a page of text."""
-    return any(sum(type(cell) in (int, float) for cell in row) > 1 for row in cells)
+    return any(
+        sum(to_number(_written(cell), True) is not None for cell in row if cell != "") > 1 for row in cells
+    )
 
 
 def _text(cells: Sequence[Sequence[Any]]) -> bytes:
