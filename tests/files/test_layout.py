@@ -263,6 +263,26 @@ def test_a_file_that_ends_within_its_last_number(table, cells, told):
     assert table("a,b\n" + "".join(f"1,{cell}\n" for cell in cells)).warnings == []
 
 
+@pytest.mark.parametrize("separator", [",", " ", ";"])
+@pytest.mark.parametrize("end", ["", "\n"])
+def test_words_below_the_rows_are_remarks(table, separator, end):
+    text = "a b c\n1 2 3\n4 5 6\n".replace(" ", separator)
+    found = table(f"{text}\nEnd of\n***{end}")
+    assert found.lines == [2, 3]
+    assert found.warnings[0].startswith("lines 5 to 6 of the file ('End of")
+
+
+@pytest.mark.parametrize("more", ["7,8\n", "End,7\n", "End\n7,8,9\n", "e,n,d,!\n"])
+def test_what_has_numbers_is_no_remark_below_the_rows(table, more):
+    with pytest.raises(DataError, match=r"line 4: . cells under 3 column names"):
+        table("a,b,c\n1,2,3\n4,5,6\n" + more)
+
+
+def test_words_that_end_without_a_line_end_may_be_a_row(table):
+    with pytest.raises(DataError, match=r"line 3: 1 cells under 3 column names; .* cut off"):
+        table("a,b,c\nwhite,2,3\nwhi")
+
+
 def test_the_beginning_of_a_large_file_is_enough_for_its_names(tmp_path):
     path = tmp_path / "large.csv"
     path.write_text("theta_i,theta_r,brdf\n" + "30,20,0.5\n" * 150_000)

@@ -25,8 +25,16 @@ from numpy.typing import NDArray
 
 from pbrdf.errors import DataError
 from pbrdf.files.atomic import atomic_file
-from pbrdf.files.cells import Cells, RaggedRowError, read_body
-from pbrdf.files.layout import SEPARATORS, OpenQuotationError, comment_of, find_layout, kept_comment
+from pbrdf.files.cells import Body, Cells, RaggedRowError, read_body
+from pbrdf.files.layout import (
+    SEPARATORS,
+    Layout,
+    OpenQuotationError,
+    comment_of,
+    find_layout,
+    kept_comment,
+    split_records,
+)
 from pbrdf.files.numbers import to_number
 from pbrdf.files.text import first_bytes, read_bytes, utf8
 from pbrdf.files.workbook import is_workbook, sheet_texts
@@ -38,6 +46,8 @@ TABLE_EXTENSIONS = (".csv", ".tsv", ".txt", ".dat", ".xlsx", ".xlsm", ".xlsb", "
 #: The line of column names of a table of any use begins within so many bytes.
 _HEAD = 2**20
 _SHOWN = 60
+#: Remarks below a table are not longer.
+_FOOTER = 2000
 _THOUSANDS = re.compile(
     r"[-+]?[0-9]{1,3}(?:(?:,[0-9]{3})+(?:\.[0-9]*)?|(?:\.[0-9]{3})+,[0-9]*"
     r"|(?:[ '\u00a0\u202f][0-9]{3})+(?:[.,][0-9]*)?)"
@@ -294,11 +304,10 @@ def _table(path: Path, text: bytes, separators: Sequence[str], sheet: str = "") 
     begin = 0
     for _ in range(layout.body):
         begin = text.find(b"\n", begin) + 1 or len(text)
-    width = len(layout.names)
     try:
-        body = read_body(text, begin, layout.separator, width, layout.body + 1)
+        body, footer = _rows(text, begin, layout)
     except RaggedRowError as ragged:
-        hint = ""
+        width, hint = len(layout.names), ""
         if layout.separator == "," and ragged.count > width:
             hint = "; if its numbers have decimal commas, separate the columns by semicolons"
         elif ragged.count < width and ragged.line == text.count(b"\n") + 1 > layout.body + 1:
@@ -329,9 +338,42 @@ def _table(path: Path, text: bytes, separators: Sequence[str], sheet: str = "") 
         sheet=sheet,
     )
     table.warnings.extend(_passed_over(layout.remarks))
+    table.warnings.extend(_passed_over(footer))
     if not sheet and not text.endswith(b"\n"):
         table.warnings.extend(_cut_off(table))
     return table
+
+
+def _rows(text: bytes, begin: int, layout: Layout) -> tuple[Body, list[tuple[int, str]]]:
+    """The rows of a table, and remarks below them: lines of words to the end of the file, whole ones."""
+    width, first = len(layout.names), layout.body + 1
+    try:
+        return read_body(text, begin, layout.separator, width, first), []
+    except RaggedRowError as ragged:
+        end = begin
+        for _ in range(ragged.line - first):
+            end = text.find(b"\n", end) + 1
+        rest = text[end:]
+        if end == begin or len(rest) > _FOOTER:
+            raise
+        lines = rest.decode().split("\n")
+        decimal_comma = layout.separator != ","
+        words = [record.cells for record in split_records(lines, layout.separator)]
+        if any(
+            len(cells) >= width or any(_is_number(cell, decimal_comma) for cell in cells) for cells in words
+        ):
+            raise
+        body = read_body(text[:end], begin, layout.separator, width, first)
+        # Words that begin a row, where nothing ends it, may be a row cut off.
+        if not rest.endswith(b"\n") and not _is_number(body.cells.text(0, 0), decimal_comma):
+            raise
+        return body, [
+            (number, line.strip()) for number, line in enumerate(lines, ragged.line) if line.strip()
+        ]
+
+
+def _is_number(cell: str, decimal_comma: bool) -> bool:
+    return to_number(cell, decimal_comma) is not None
 
 
 def _plain_blanks(text: bytes) -> bytes:
