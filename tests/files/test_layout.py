@@ -33,6 +33,9 @@ def table(tmp_path):
 
 LAYOUTS = {
     "one blank": "theta_i theta_r phi brdf\n" + rows(" "),
+    "vertical bars": "theta_i|theta_r|phi|brdf\n" + rows(" | "),
+    "a line under the names": "theta_i theta_r phi brdf\n" + 24 * "-" + "\n" + rows(" "),
+    "lines under the names": "theta_i theta_r phi brdf\n" + 4 * "======= " + "\n" + rows(" "),
     "several blanks": "  theta_i  theta_r   phi brdf\n" + "".join(f"   {x}  \n" for x in rows("   ").split("\n")[:-1]),
     "tabs and blanks": "theta_i\ttheta_r phi  \tbrdf\n" + rows(" \t"),
     "aligned by blanks, separated by commas": "theta_i, theta_r,  phi,  brdf\n" + rows(" , "),

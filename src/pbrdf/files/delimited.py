@@ -1,7 +1,7 @@
 """Tables of delimited columns: CSV and its relatives, as instruments, spreadsheets and people write them.
 
-A line of column names, and one row a line under it. Columns are separated by commas, semicolons, tabs or blanks (one
-or several spaces or tabs), whichever shows the numbers; with all but commas, decimal commas are read as well as points.
+A line of column names, and one row a line under it. Columns are separated by commas, semicolons, tabs, vertical bars or
+blanks (one or several), whichever shows the numbers; with all but commas, decimal commas are read as well as points.
 :mod:`pbrdf.files.layout` says how the names are found: a line of text above the numbers, or the last comment with as
 many names; remarks may stand before it, a row of units under it. Cells may be quoted, and then hold separators and line
 breaks. Lines that begin with ``#`` (or ``%``, ``//``, ``!``, ``;``) are comments; empty lines, and rows of nothing but

@@ -32,11 +32,13 @@ __all__ = [
 
 #: Stands for one or several spaces or tabs.
 BLANKS = " "
-SEPARATORS = (",", ";", "\t", BLANKS)
+SEPARATORS = (",", ";", "\t", "|", BLANKS)
 
 #: What a spreadsheet writes for a cell in error begins with the mark of a comment, too.
 _COMMENT = re.compile(r"\s*(?!#(?:N/A|[A-Z]+(?:/0)?[!?]))(?:#|%|//|!|;)+(.*)", re.DOTALL)
 _BLANKS = re.compile(r"[ \t\v\f\n]+")
+#: Part of a line drawn under names.
+_RULE = re.compile(r"[-=_*+:]{3,}")
 _QUOTED = re.compile(r'"[^"]*"')
 _NO_NAMES = "there is no line of column names"
 _FIRST, _SCANNED = 30, 500
@@ -84,7 +86,7 @@ class Layout:
     Attributes
     ----------
     separator
-        A comma, a semicolon, a tab, or :data:`BLANKS`.
+        A comma, a semicolon, a tab, a vertical bar, or :data:`BLANKS`.
     names
         Of the columns.
     names_line
@@ -273,7 +275,11 @@ class _Candidate:
 
 
 def _candidates(lines: Sequence[str], separator: str, many: int) -> Iterator[_Candidate]:
-    records = _records(lines, separator, many)
+    records = [
+        record
+        for record in _records(lines, separator, many)
+        if not all(_RULE.fullmatch(cell) for cell in record.cells if cell)
+    ]
     kinds = [_kinds(record.cells, separator) for record in records]
     scores: Counter[int] = Counter()
     for record, kind in zip(records, kinds, strict=True):
@@ -333,7 +339,7 @@ def _with_header(
             return data, layout
         chosen = units[:1]
     names = chosen[0]
-    if width == 1 and re.search("[,;\t]", _QUOTED.sub("", lines[records[names].line])):
+    if width == 1 and re.search("[,;\t|]", _QUOTED.sub("", lines[records[names].line])):
         return data, None  # these separate the names, and decimals of the numbers
     body = names + 1
     row_of_units = next((i for i in units if i > names), None)
@@ -348,7 +354,7 @@ def _with_header(
         separator,
         [" ".join(name.split()) for name in stack[names]],
         records[names].line + 1,
-        records[body - 1].following,
+        records[body].line,
         said,
         remarks=[(records[i].line + 1, _remark(lines, records[i], separator)) for i in passed],
     )
