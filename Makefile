@@ -35,6 +35,7 @@ benchmark: $(TEST_STAMP)
 	$(BIN)/python benchmarks/rendering.py
 	$(BIN)/python benchmarks/domain.py
 	$(BIN)/python benchmarks/domain.py --single
+	$(BIN)/python benchmarks/read_csv.py
 
 $(VENV)/bin/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \

@@ -53,7 +53,6 @@ def test_the_format_can_be_stated(text_file):
             {"format": "xml"},
             "'xml' is not known; use one of csv, netcdf, zarr, scatmech, cornell",
         ),
-        ("data.xyz", {}, r"extension '\.xyz' is not known"),
         ("data.csv", {"were": {}}, "no option 'were'; its options are column, where, skip_invalid"),
         ("data.brdf", {"column": {}}, "no option 'column'; its options are wavelength"),
         ("data.nc", {"wavelength": 5}, "it has no options"),
@@ -62,6 +61,13 @@ def test_the_format_can_be_stated(text_file):
 def test_what_is_not_known_is_answered_with_the_choices(text_file, name, options, words):
     with pytest.raises(DataError, match=words):
         read(text_file(TABLE, name), **options)
+
+
+def test_a_table_with_angles_is_known_by_its_names_whatever_its_extension(text_file):
+    assert_array_equal(read(text_file(TABLE, "data.asc"))["I"], [0.5])
+    for content in ("time_s,current\n1,2\n", "words\n", ""):
+        with pytest.raises(DataError, match=r"extension '\.xyz' is not known"):
+            read(text_file(content, "data.xyz"))
 
 
 def test_a_missing_file_is_named(tmp_path):

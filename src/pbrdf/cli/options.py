@@ -220,6 +220,7 @@ _READING: dict[str, tuple[Any, Any]] = {
         ],
         None,
     ),
+    "sheet": (_reading_option(str | None, "Sheet of a workbook (.xlsx, .xls, .ods) to read."), None),
 }
 
 

@@ -29,7 +29,7 @@ class Reading:
 
     Attributes
     ----------
-    format, quantity, azimuth, stokes, illumination, cosine_weighted, angles, skip_invalid, every
+    format, quantity, azimuth, stokes, illumination, cosine_weighted, angles, skip_invalid, every, sheet
         As in :func:`pbrdf.read`; None and False where not given.
     column, where, select
         Texts ``NAME=VALUE``.
@@ -50,6 +50,7 @@ class Reading:
     cosine_weighted: bool | None
     angles: str | None
     every: int | None
+    sheet: str | None
 
     def stated(self) -> dict[str, Any]:
         """What was given, by option."""

@@ -177,6 +177,8 @@ def group_labels(values: ArrayLike) -> NDArray[Any]:
     array = np.asarray(values)
     if array.dtype.kind in "iu":
         return array.astype(np.int64)
+    if array.dtype.kind == "U":
+        return _text_labels(array)
     flat = array.ravel().tolist()
     if not all(isinstance(label, str) for label in flat):
         if all(isinstance(label, int | float) and float(label).is_integer() for label in flat):
@@ -185,6 +187,17 @@ def group_labels(values: ArrayLike) -> NDArray[Any]:
     if flat and all(spells_integer(label) for label in flat):
         return array.astype(np.int64)
     return array.astype(np.str_)
+
+
+def _text_labels(array: NDArray[np.str_]) -> NDArray[Any]:
+    """As :func:`group_labels`; few labels come many times."""
+    if not array.size or not spells_integer(array.flat[0]):
+        return array.copy()
+    flat = array.ravel().tolist()
+    numbers = {label: int(label) for label in set(flat) if spells_integer(label)}
+    if len(numbers) < len(set(flat)):
+        return array.copy()
+    return np.array([numbers[label] for label in flat], dtype=np.int64).reshape(array.shape)
 
 
 def _floats(name: str, value: ArrayLike) -> NDArray[np.float64]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import functools
 import importlib
 import importlib.metadata
+import re
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
@@ -114,7 +115,7 @@ def read(
     **options
         Options of the format's reader: for ``"csv"`` those of :func:`pbrdf.data.formats.csv_table.reading.read_csv`
         (`where`, `skip_invalid`, `quantity`, `azimuth`, `stokes`, `illumination`, `cosine_weighted`,
-        `angles`); for formats with wavelengths of their own `wavelength` in nm, one or several; for those of tables
+        `angles`, `sheet`); for formats with wavelengths of their own `wavelength` in nm, one or several; for those of tables
         over a grid of angles `every`, see :func:`pbrdf.data.formats.pbsdf.read_pbsdf`.
 
     Returns
@@ -212,6 +213,8 @@ def _of_content(path: Path) -> Reader:
     asked = [*named, *(reader for reader in readers if not plain or reader.name in _OWN)]
     known = next((reader for reader in asked if _sniffs(reader, path)), None)
     found = [*([] if known is None else [known]), *plain, *named]
+    if not found and path.is_file() and _has_angles(path):
+        found = [_own("csv")]
     if path.is_dir():
         found = [reader for reader in found if reader.folder]
         if not found:
@@ -223,6 +226,13 @@ def _of_content(path: Path) -> Reader:
             f"{', '.join(format_names())}{also}"
         )
     return found[0]
+
+
+def _has_angles(path: Path) -> bool:
+    """Whether a file of an extension that no format has is a table with columns of zenith angles."""
+    from pbrdf.files.delimited import column_names
+
+    return any(re.search("theta|zenith|inciden|aoi", name.lower()) for name in column_names(path))
 
 
 def _sniffs(reader: Reader, path: Path) -> bool:

@@ -84,7 +84,8 @@ class _Labels:
 
     def rows(self, rows: NDArray[np.intp]) -> str:
         # One line of a file may hold several rows, for example one per wavelength.
-        names = list(dict.fromkeys(int(row) if self.lines is None else self.lines[row] for row in rows))
+        indices = rows.tolist()
+        names = list(dict.fromkeys(indices if self.lines is None else map(self.lines.__getitem__, indices)))
         kind = "row" if self.lines is None else "line"
         more = f" and {len(names) - _ROWS_NAMED} more" if len(names) > _ROWS_NAMED else ""
         return f"{kind}{'s' if len(names) > 1 else ''} {', '.join(map(str, names[:_ROWS_NAMED]))}{more}"
@@ -330,15 +331,17 @@ def _groups(ds: xr.Dataset, labels: _Labels) -> Iterator[Issue]:
     group = ds["group"].values
     if group.dtype.kind == "i":
         return
-    bad = np.flatnonzero([not label or label != label.strip() or not label.isprintable() for label in group])
-    if bad.size:
+    found = set(group.tolist())
+    unusable = {label: not label or label != label.strip() or not label.isprintable() for label in found}
+    if any(unusable.values()):
+        bad = np.flatnonzero([unusable[label] for label in group.tolist()])
         yield _error(
             "group",
             f"{labels.variable('group')}, {labels.rows(bad)}: the label {str(group[bad[0]])!r} is empty, has "
             "white space around it or holds characters that cannot be printed",
             bad,
         )
-    if all(map(spells_integer, group)):
+    if all(map(spells_integer, unusable)):
         yield _error("group", "all group labels spell integers; store them as integers")
 
 
@@ -417,6 +420,8 @@ def _physics(ds: xr.Dataset, labels: _Labels) -> Iterator[Issue]:
 
 def _degree_of_polarization(ds: xr.Dataset) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """DoP from what was measured, a lower bound if a channel is missing, and its standard uncertainty."""
+    if not {"Q", "U", "V"} & set(map(str, ds.data_vars)):
+        return np.zeros(ds.sizes[DIMENSION]), np.zeros(ds.sizes[DIMENSION])
     polarized = np.stack([_or_zero(ds, name) for name in ("Q", "U", "V")])
     deviations = np.stack([_or_zero(ds, std_name(name)) for name in ("Q", "U", "V")])
     length = np.linalg.norm(polarized, axis=0)

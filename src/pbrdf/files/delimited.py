@@ -1,18 +1,23 @@
 """Tables of delimited columns: CSV and its relatives, as instruments, spreadsheets and people write them.
 
-A line of column names, and one row a line under it. Columns are separated by commas, semicolons or tabs, whichever the
-names are; with the last two, decimal commas are read as well as points. Cells may be quoted, and then hold separators
-and line breaks. Lines that begin with ``#`` are comments; empty lines, and rows of nothing but empty cells, count for
-nothing. White space around a cell does not belong to it.
+A line of column names, and one row a line under it. Columns are separated by commas, semicolons, tabs, vertical bars or
+blanks (one or several), whichever shows the numbers; with all but commas, decimal commas are read as well as points.
+:mod:`pbrdf.files.layout` says how the names are found: a line of text above the numbers, or the last comment with as
+many names; remarks may stand before it, a row of units under it. Cells may be quoted, and then hold separators and line
+breaks. Lines that begin with ``#`` (or ``%``, ``//``, ``!``, ``;``) are comments; empty lines, and rows of nothing but
+empty cells, count for nothing. White space around a cell does not belong to it, empty cells at the end of a row beyond
+the names neither. :mod:`pbrdf.files.text` says which encodings are understood, :mod:`pbrdf.files.numbers` what a number
+is. The sheet of a workbook (``.xlsx``, ``.xls``, ``.ods``, …) is a table, too: :mod:`pbrdf.files.workbook`.
 """
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import math
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -20,19 +25,37 @@ from numpy.typing import NDArray
 
 from pbrdf.errors import DataError
 from pbrdf.files.atomic import atomic_file
+from pbrdf.files.cells import Body, Cells, RaggedRowError, read_body
+from pbrdf.files.layout import (
+    SEPARATORS,
+    Layout,
+    OpenQuotationError,
+    comment_of,
+    find_layout,
+    kept_comment,
+    split_records,
+)
 from pbrdf.files.matlab import is_matlab, matlab_lines
-from pbrdf.files.text import first_bytes, lines_of, read_lines
+from pbrdf.files.numbers import to_number
+from pbrdf.files.text import first_bytes, read_bytes, utf8
+from pbrdf.files.workbook import is_workbook, sheet_texts
 
-__all__ = ["Row", "Table", "column_names", "read_table", "write_table"]
+__all__ = ["TABLE_EXTENSIONS", "Row", "Table", "column_names", "read_table", "write_table"]
 
-_SEPARATORS = (",", ";", "\t")
-_QUOTED = re.compile(r'"[^"]*"')
-_DECIMAL_COMMA = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?")
+#: Of files that tables are read from, those of workbooks last.
+TABLE_EXTENSIONS = (".csv", ".tsv", ".txt", ".dat", ".xlsx", ".xlsm", ".xlsb", ".xls", ".ods", ".mat")
 #: The line of column names of a table of any use begins within so many bytes.
 _HEAD = 2**20
+_SHOWN = 60
+#: Remarks below a table are not longer.
+_FOOTER = 2000
+_THOUSANDS = re.compile(
+    r"[-+]?[0-9]{1,3}(?:(?:,[0-9]{3})+(?:\.[0-9]*)?|(?:\.[0-9]{3})+,[0-9]*"
+    r"|(?:[ '\u00a0\u202f][0-9]{3})+(?:[.,][0-9]*)?)"
+)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Table:
     """The text of a table, each cell with its place in the file.
 
@@ -42,34 +65,54 @@ class Table:
         The file, for messages.
     names
         Of the columns, as the file spells them; one may come twice.
-    rows
+    body
         Cells of each row, as many as there are names.
     lines
-        Of the file, from 1, on which each row begins.
+        Of the file or the sheet, from 1, on which each row begins.
     comments
-        Lines that begin with ``#``, with their numbers.
+        Lines that begin with ``#`` (or another mark of comments, then as if with ``#``), and remarks before the names,
+        with their numbers; ``key,value`` as ``# key: value``.
     names_line
         Number of the line of column names.
     decimal_comma
         Whether numbers may have decimal commas: the separator is none.
     units
         What a row of units under the names says of each column, ``""`` where nothing; None where there is no such row.
+    statements_end
+        Number of the line before which comments state something of the whole table.
+    sheet
+        Of a workbook; empty for a text.
+    warnings
+        Sentences on what the user should know: lines that were passed over, a file that seems cut off.
     """
 
     path: Path
     names: list[str]
-    rows: list[list[str]]
+    body: Cells
     lines: list[int]
     comments: list[tuple[int, str]]
     names_line: int
     decimal_comma: bool
     units: list[str] | None = None
+    statements_end: int = 0
+    sheet: str = ""
+    warnings: list[str] = field(default_factory=list)
 
     def __len__(self) -> int:
-        return len(self.rows)
+        return len(self.body)
 
     def __iter__(self) -> Iterator[Row]:
         return (Row(self, index) for index in range(len(self)))
+
+    @property
+    def rows(self) -> list[list[str]]:
+        """Cells of each row."""
+        return self.body.rows()
+
+    @property
+    def origin(self) -> str:
+        """The file, and the sheet where there are sheets, as messages begin."""
+        return _origin(self.path, self.sheet)
 
     def column(self, name: str) -> int:
         """Where a column stands, from 0.
@@ -81,19 +124,31 @@ class Table:
         """
         if name not in self.names:
             raise DataError(
-                f"{self.path}: there is no column {name!r}; the columns are {', '.join(self.names)}"
+                f"{self.origin}: there is no column {name!r}; the columns are {', '.join(self.names)}"
             )
         if self.names.count(name) > 1:
-            raise DataError(f"{self.path}: two columns are called {name!r}; rename one")
+            raise DataError(f"{self.origin}: two columns are called {name!r}; rename one")
         return self.names.index(name)
+
+    def line(self, row: int) -> str:
+        """The file and the line of a row, as messages begin."""
+        return f"{self.origin}: line {self.lines[row]}"
 
     def place(self, row: int, column: int) -> str:
         """The file, the line and the column of a cell, as messages begin."""
-        return f"{self.path}: line {self.lines[row]}, column {self.names[column]!r}"
+        return f"{self.line(row)}, column {self.names[column]!r}"
+
+    def cell(self, row: int, column: int) -> str:
+        """What a cell holds, ``""`` where it is empty."""
+        return self.body.text(row, column)
+
+    def cells(self, column: int) -> list[str]:
+        """What the cells of a column hold; quicker than row by row."""
+        return self.body.texts(column)
 
     def text(self, row: int, column: int) -> str:
         """What a cell holds; raises DataError, which names the place, if that is nothing."""
-        cell = self.rows[row][column]
+        cell = self.cell(row, column)
         if not cell:
             raise DataError(f"{self.place(row, column)}: the cell is empty")
         return cell
@@ -113,29 +168,58 @@ class Table:
         DataError
             If it is no number; names line and column.
         """
-        cell = self.rows[row][column]
-        try:
-            return float(cell)
-        except ValueError:
-            pass
+        cell = self.cell(row, column)
+        number = to_number(cell, self.decimal_comma)
+        if number is not None:
+            return number
         if cell.lower() in missing:
             return math.nan
-        if self.decimal_comma and _DECIMAL_COMMA.fullmatch(cell):
-            return float(cell.replace(",", "."))
-        raise DataError(f"{self.place(row, column)}: {cell!r} is not a number")
+        hint = "; leave out the marks of thousands" if _THOUSANDS.fullmatch(cell[:_SHOWN]) else ""
+        raise DataError(f"{self.place(row, column)}: {_shown(cell)} is not a number{hint}")
 
     def numbers(self, column: int, missing: Collection[str] = ()) -> NDArray[np.float64]:
-        """The numbers of a column, as :meth:`number` reads them; shape (N,)."""
-        return np.array([self.number(row, column, missing) for row in range(len(self))], dtype=np.float64)
+        """The numbers of a column, as :meth:`number` reads them; shape (N,).
+
+        Raises
+        ------
+        DataError
+            As :meth:`number`, and if commas mark thousands in one cell and points decimals in another.
+        """
+        values, odd, empty = self.body.floats(column)
+        for row in np.sort(odd if "" in missing else np.concatenate([odd, empty])).tolist():
+            values[row] = self.number(row, column, missing)
+        if self.body.mixed:
+            self._refuse_thousands(column)
+        return values
+
+    def _refuse_thousands(self, column: int) -> None:
+        """``1,234`` beside ``2.5`` is not 1.234."""
+        cells = self.cells(column)
+        if any("." in cell for cell in cells) and any("," in cell for cell in cells):
+            for row, cell in enumerate(cells):
+                if _THOUSANDS.fullmatch(cell):
+                    raise DataError(
+                        f"{self.place(row, column)}: {cell!r}: decimals or thousands? Other cells of the column have "
+                        "decimal points; write all with points, without marks of thousands"
+                    )
 
     def require_rows(self) -> None:
         """Raises DataError if there are only column names."""
-        if not self.rows:
-            raise DataError(f"{self.path}: there are no rows under the column names")
+        if not len(self):
+            raise DataError(f"{self.origin}: there are no rows under the column names")
 
     def taken(self, rows: Sequence[int]) -> Table:
         """The table of these rows alone."""
-        return replace(self, rows=[self.rows[row] for row in rows], lines=[self.lines[row] for row in rows])
+        return replace(self, body=self.body.taken(rows), lines=[self.lines[row] for row in rows])
+
+
+def _origin(path: Path, sheet: str) -> str:
+    return f"{path}: sheet {sheet!r}" if sheet else str(path)
+
+
+def _shown(cell: str) -> str:
+    """A cell in a message: a long one cut."""
+    return repr(cell) if len(cell) <= _SHOWN else f"{cell[:_SHOWN]!r}…"
 
 
 @dataclass(frozen=True)
@@ -151,7 +235,7 @@ class Row:
     @property
     def line(self) -> str:
         """The file and the line, as messages begin."""
-        return f"{self.table.path}: line {self.table.lines[self.index]}"
+        return self.table.line(self.index)
 
     def place(self, name: str) -> str:
         """The file, the line and the column of a cell, as messages begin."""
@@ -159,7 +243,7 @@ class Row:
 
     def get(self, name: str) -> str:
         """What a cell holds, ``""`` where it is empty or there is no such column."""
-        return self.table.rows[self.index][self.table.column(name)] if name in self.table.names else ""
+        return self.table.cell(self.index, self.table.column(name)) if name in self.table.names else ""
 
     def text(self, name: str) -> str:
         """What a cell holds, which must not be nothing."""
@@ -170,75 +254,183 @@ class Row:
         return self.table.number(self.index, self.table.column(name))
 
 
-def read_table(path: Path) -> Table:
+def read_table(path: Path, sheet: str | None = None) -> Table:
     """Read a table; it may be one without rows.
+
+    Parameters
+    ----------
+    path
+        The file, of any extension.
+    sheet
+        Of a workbook, by its name; by default the only one that holds a table.
 
     Raises
     ------
     DataError
         If the file cannot be read, has no line of column names, or a row has not as many cells as there are names.
     """
-    lines = matlab_lines(path) if is_matlab(path) else read_lines(path)
-    comments = [(number, line.strip()) for number, line in enumerate(lines, 1) if _is_comment(line)]
-    start = _start(lines)
-    if start is None:
-        raise DataError(f"{path}: there is no line of column names")
-    separator = _separator(lines[start])
-    # Comments become empty lines, which keeps the numbers of the lines right.
-    body = ("" if _is_comment(line) else line + "\n" for line in lines[start:])
-    reader = csv.reader(body, delimiter=separator, skipinitialspace=True)
-    names: list[str] = []
-    names_line, following = 0, start + 1
-    rows, numbers = [], []
+    raw = read_bytes(path)
+    if is_workbook(raw):
+        texts = sheet_texts(path, raw, sheet)
+        name = next(iter(texts)) if len(texts) == 1 else _only_table(path, texts)
+        return _table(path, texts[name], ("\t",), name)
+    if sheet is not None:
+        raise DataError(f"{path}: this is a text, which has no sheets; leave out sheet={sheet!r}")
+    if is_matlab(path):
+        return _table(path, "\n".join([*matlab_lines(path), ""]).encode(), ("\t",))
+    return _table(path, utf8(path, raw), SEPARATORS)
+
+
+def _only_table(path: Path, texts: Mapping[str, bytes]) -> str:
+    """The only sheet that has names above numbers."""
+    found = []
+    for name, text in texts.items():
+        with contextlib.suppress(DataError):
+            find_layout(path, _head_lines(text), ("\t",))
+            found.append(name)
+    if len(found) == 1:
+        return found[0]
+    raise DataError(
+        f"{path}: the sheets {', '.join(map(repr, found or texts))} all hold numbers; name one with "
+        "sheet=… (--sheet), or keep only one of them in the file"
+    )
+
+
+def _table(path: Path, text: bytes, separators: Sequence[str], sheet: str = "") -> Table:
+    """The table that a text in UTF-8 is."""
+    origin = _origin(path, sheet)
+    text = _plain_blanks(text)
+    lines = _head_lines(text)
+    if lines and lines[0].lstrip().startswith(("<?xml", "<html", "<!DOCTYPE", "<table")):
+        raise DataError(f"{origin}: line 1: this is XML or HTML; save it as CSV or as a workbook")
+    layout = find_layout(Path(origin), lines, separators)
+    begin = 0
+    for _ in range(layout.body):
+        begin = text.find(b"\n", begin) + 1 or len(text)
     try:
-        for cells in reader:
-            number, following = following, start + 1 + reader.line_num
-            if not any(cell.strip() for cell in cells):
-                continue
-            if not names:
-                names, names_line = [cell.strip() for cell in cells], number
-                continue
-            if len(cells) != len(names):
-                hint = ""
-                if separator == "," and len(cells) > len(names):
-                    hint = "; if its numbers have decimal commas, separate the columns by semicolons"
-                raise DataError(
-                    f"{path}: line {number}: {len(cells)} cells under {len(names)} column names{hint}"
-                )
-            rows.append([cell.strip() for cell in cells])
-            numbers.append(number)
-    except csv.Error as error:
-        raise DataError(f"{path}: line {following}: {error}; is a quotation mark left open?") from error
-    if not names:
-        raise DataError(f"{path}: there is no line of column names")
-    return Table(path, names, rows, numbers, comments, names_line, decimal_comma=separator != ",")
+        body, footer = _rows(text, begin, layout)
+    except RaggedRowError as ragged:
+        width, hint = len(layout.names), ""
+        if layout.separator == "," and ragged.count > width:
+            hint = "; if its numbers have decimal commas, separate the columns by semicolons"
+        elif ragged.count < width and ragged.line == text.count(b"\n") + 1 > layout.body + 1:
+            hint = "; the file ends there without a line end: it seems cut off"
+        raise DataError(
+            f"{origin}: line {ragged.line}: {ragged.count} cells under {width} column names{hint}"
+        ) from None
+    except OpenQuotationError as error:
+        raise DataError(
+            f"{origin}: line {error.line}: a cell that begins there does not end; is a quotation mark left open?"
+        ) from None
+    comments = [
+        (number, said)
+        for number, line in enumerate(lines[: layout.body], 1)
+        if (said := kept_comment(line, layout.separator)) is not None
+    ]
+    remarks = [(number, f"# {said}") for number, said in layout.remarks]
+    table = Table(
+        path,
+        layout.names,
+        body.cells,
+        body.lines,
+        sorted([*comments, *remarks, *body.comments]),
+        layout.names_line,
+        decimal_comma=layout.separator != ",",
+        units=layout.units,
+        statements_end=layout.body + 1 if layout.in_comment else layout.names_line,
+        sheet=sheet,
+    )
+    table.warnings.extend(_passed_over(layout.remarks))
+    table.warnings.extend(_passed_over(footer))
+    if not sheet and not text.endswith(b"\n"):
+        table.warnings.extend(_cut_off(table))
+    return table
+
+
+def _rows(text: bytes, begin: int, layout: Layout) -> tuple[Body, list[tuple[int, str]]]:
+    """The rows of a table, and remarks below them: lines of words to the end of the file, whole ones."""
+    width, first = len(layout.names), layout.body + 1
+    try:
+        return read_body(text, begin, layout.separator, width, first), []
+    except RaggedRowError as ragged:
+        end = begin
+        for _ in range(ragged.line - first):
+            end = text.find(b"\n", end) + 1
+        rest = text[end:]
+        if end == begin or len(rest) > _FOOTER:
+            raise
+        lines = rest.decode().split("\n")
+        decimal_comma = layout.separator != ","
+        words = [record.cells for record in split_records(lines, layout.separator)]
+        if any(
+            len(cells) >= width or any(_is_number(cell, decimal_comma) for cell in cells) for cells in words
+        ):
+            raise
+        body = read_body(text[:end], begin, layout.separator, width, first)
+        # Words that begin a row, where nothing ends it, may be a row cut off.
+        if not rest.endswith(b"\n") and not _is_number(body.cells.text(0, 0), decimal_comma):
+            raise
+        return body, [
+            (number, line.strip()) for number, line in enumerate(lines, ragged.line) if line.strip()
+        ]
+
+
+def _is_number(cell: str, decimal_comma: bool) -> bool:
+    return to_number(cell, decimal_comma) is not None
+
+
+def _plain_blanks(text: bytes) -> bytes:
+    """A text with plain spaces for those that do not break or are narrow."""
+    if not text.isascii():
+        for space in "\u00a0\u2007\u2009\u202f":
+            text = text.replace(space.encode(), b" ")
+    return text
+
+
+def _head_lines(text: bytes) -> list[str]:
+    """Lines of the beginning of a text, all of them whole."""
+    head = text[:_HEAD]
+    if len(text) > _HEAD:
+        head = head[: head.rfind(b"\n") + 1] or head
+    return head.decode(errors="replace").split("\n")
+
+
+def _passed_over(remarks: Sequence[tuple[int, str]]) -> Iterator[str]:
+    said = [(line, text) for line, text in remarks if not re.fullmatch(r"sep=.?", text, re.IGNORECASE)]
+    if said:
+        lines = f"lines {said[0][0]} to {said[-1][0]}" if len(said) > 1 else f"line {said[0][0]}"
+        first = said[0][1] if len(said[0][1]) <= _SHOWN else said[0][1][:_SHOWN] + "…"
+        taken = "were taken as remarks" if len(said) > 1 else "was taken as a remark"
+        yield f"{lines} of the file ({first!r}{' …' if len(said) > 1 else ''}) {taken}, not as data"
+
+
+def _cut_off(table: Table) -> Iterator[str]:
+    """Whether the last number has fewer digits than all others of its column, where no line end follows it."""
+    column = len(table.names) - 1
+    others = range(max(0, len(table) - 1000), len(table) - 1)
+    if len(others) < 2:
+        return
+    last = table.cell(len(table) - 1, column)
+    lengths = [len(table.cell(row, column)) for row in others]
+    shortest = min(lengths)
+    missing = shortest - len(last)
+    if shortest > 3 and (missing > 1 or (missing == 1 and shortest == max(lengths))):
+        yield (
+            f"line {table.lines[-1]}: the last number, {last!r}, has fewer digits than any other of the column "
+            f"{table.names[column]!r}, and no line end follows: the file seems cut off"
+        )
 
 
 def column_names(path: Path) -> list[str]:
     """Column names of a table, to recognise its format by; none if the file is no table or cannot be read."""
-    lines = lines_of(first_bytes(path, _HEAD).decode("utf-8-sig", errors="replace"))
-    start = _start(lines)
-    if start is None:
+    raw = first_bytes(path, _HEAD)
+    if not raw or is_workbook(raw):
         return []
     try:
-        cells = next(csv.reader([lines[start]], delimiter=_separator(lines[start]), skipinitialspace=True))
-    except csv.Error:
+        text = utf8(path, raw)
+        return find_layout(path, _head_lines(_plain_blanks(text))).names
+    except DataError:
         return []
-    return [cell.strip() for cell in cells]
-
-
-def _is_comment(line: str) -> bool:
-    return line.lstrip().startswith("#")
-
-
-def _start(lines: Sequence[str]) -> int | None:
-    """Index of the first line that is neither empty nor a comment."""
-    return next((i for i, line in enumerate(lines) if line.strip() and not _is_comment(line)), None)
-
-
-def _separator(line: str) -> str:
-    """The separator of which the line of column names has most, outside quotation marks."""
-    return max(_SEPARATORS, key=_QUOTED.sub("", line).count)
 
 
 def write_table(
@@ -271,5 +463,5 @@ def write_table(
         plain = csv.writer(file, lineterminator="\n")
         quoted = csv.writer(file, lineterminator="\n", quoting=csv.QUOTE_ALL)
         for cells in map(list, (names, *rows)):
-            # A row that began with # would be read as a comment.
-            (quoted if cells and _is_comment(str(cells[0])) else plain).writerow(cells)
+            # A row that began with the mark of a comment would be read as one.
+            (quoted if cells and comment_of(str(cells[0]), ",") is not None else plain).writerow(cells)

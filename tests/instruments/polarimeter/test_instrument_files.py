@@ -413,8 +413,8 @@ def test_analyser_files_that_are_wrong(tmp_path):
         read_analyzer(tmp_path / "d.nc")
     with pytest.raises(DataError, match="no such file"):
         read_analyzer(tmp_path / "e.nc")
-    with pytest.raises(DataError, match=r"extension '\.txt'"):
-        read_analyzer(tmp_path / "W.txt")
+    with pytest.raises(DataError, match=r"extension '\.json'"):
+        read_analyzer(tmp_path / "W.json")
     with pytest.raises(DataError, match=r"use \.nc"):
         write_analyzer(MAP, tmp_path / "W.csv")
 

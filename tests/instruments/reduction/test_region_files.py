@@ -116,5 +116,5 @@ def test_a_picture_of_labels(tmp_path):
 
 
 def test_another_kind_of_file(tmp_path):
-    with pytest.raises(DataError, match=r"regions are read from .toml, .csv"):
+    with pytest.raises(DataError, match=r"regions are read from \.toml, \.csv and other tables"):
         read_regions(tmp_path / "roi.json")

@@ -8,7 +8,7 @@ import numpy as np
 
 from pbrdf.errors import DataError
 from pbrdf.files.atomic import atomic_file
-from pbrdf.files.delimited import read_table, write_table
+from pbrdf.files.delimited import TABLE_EXTENSIONS, read_table, write_table
 from pbrdf.instruments.polarimeter.polarimeter import Polarimeter, measured
 from pbrdf.optics.stokes import STOKES
 
@@ -23,8 +23,8 @@ def read_analyzer(path: str | Path) -> Polarimeter:
     Parameters
     ----------
     path
-        ``.csv`` with the columns state, w_I, w_Q, w_U, w_V (:mod:`pbrdf.files.delimited` says how they may be
-        separated) and a row for each state; or ``.nc`` with a variable
+        A table (``.csv``, ``.xlsx`` …) with the columns state, w_I, w_Q, w_U, w_V (:mod:`pbrdf.files.delimited` says
+        how they may be separated) and a row for each state; or ``.nc`` with a variable
         ``analyzer`` over (row, column, state, stokes) or (state, stokes).
 
     Raises
@@ -33,11 +33,12 @@ def read_analyzer(path: str | Path) -> Polarimeter:
         If the file cannot be read or lacks what is expected; names the file, the line and the column.
     """
     path = Path(path)
-    readers = {".csv": _read_csv, ".nc": _read_netcdf}
+    readers = {**dict.fromkeys(TABLE_EXTENSIONS, _read_csv), ".nc": _read_netcdf}
     reader = readers.get(path.suffix.lower())
     if reader is None:
         raise DataError(
-            f"{path}: the extension {path.suffix!r} cannot be read as analyser vectors; use .csv or .nc"
+            f"{path}: the extension {path.suffix!r} cannot be read as analyser vectors; use .csv, another "
+            "table, or .nc"
         )
     if not path.is_file():
         raise DataError(f"{path}: there is no such file")
@@ -81,7 +82,7 @@ def _read_csv(path: Path) -> tuple[np.ndarray, list[str] | None]:
     table = read_table(path)
     state = table.column("state")
     vectors = [table.numbers(table.column(name)) for name in _COLUMNS]
-    return np.array(vectors).T, [cells[state] for cells in table.rows]
+    return np.array(vectors).T, table.cells(state)
 
 
 def _read_netcdf(path: Path) -> tuple[np.ndarray, list[str] | None]:

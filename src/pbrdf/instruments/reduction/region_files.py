@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 
 from pbrdf.errors import DataError
-from pbrdf.files.delimited import read_table
+from pbrdf.files.delimited import TABLE_EXTENSIONS, read_table
 from pbrdf.files.text import read_toml
 from pbrdf.instruments.frames.pictures import SUFFIXES, open_pictures
 from pbrdf.instruments.reduction.regions import Ellipse, LabelRegion, Polygon, Rectangle, Region
@@ -82,7 +82,7 @@ def _polygon(points: Sequence[Sequence[float]]) -> Polygon:
 
 
 def read_regions(path: str | Path) -> dict[str, Region]:
-    """Regions by name from a TOML or CSV file or a picture of labels; the module's text describes them.
+    """Regions by name from a TOML file, a table or a picture of labels; the module's text describes them.
 
     Raises
     ------
@@ -93,7 +93,7 @@ def read_regions(path: str | Path) -> dict[str, Region]:
     kind = path.suffix.lower()
     if kind == ".toml":
         regions = _from_toml(path)
-    elif kind == ".csv":
+    elif kind in TABLE_EXTENSIONS:
         regions = _from_csv(path)
     elif kind in SUFFIXES:
         labels = _labels(path)
@@ -103,7 +103,7 @@ def read_regions(path: str | Path) -> dict[str, Region]:
         regions = {str(value): LabelRegion(labels, int(value)) for value in values if value != 0}
     else:
         raise DataError(
-            f"{path}: regions are read from .toml, .csv and pictures of labels ({', '.join(SUFFIXES)})"
+            f"{path}: regions are read from .toml, .csv and other tables, pictures of labels ({', '.join(SUFFIXES)})"
         )
     if not regions:
         raise DataError(f"{path}: there is no region in it")

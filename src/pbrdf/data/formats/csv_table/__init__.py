@@ -36,8 +36,8 @@ about polarisation and azimuth is recorded in the attribute ``assumptions``.
 usual synonyms are understood (``incidence``, ``zenith_i``, ``lambda``, ``s0`` … ``s3``).
 A unit in the name, ``_deg``, ``_rad``, ``_nm``, ``_um`` or ``[deg]``, counts before the header's. Other
 columns are left out and listed in the attribute ``ignored_columns``. Empty cells, ``nan`` and ``NA`` are
-NaN. Columns are separated by commas, semicolons or tabs; with the last two, decimal commas are read
-(:mod:`pbrdf.files.delimited`).
+NaN. :mod:`pbrdf.files.delimited` says how columns may be separated, where the names may stand, and that sheets of
+workbooks are read, too.
 
 **Covariances.** Where there is any column of them, the variances are the squares of ``<name>_std``, or, where
 there is one, the column ``cov_II``, ``cov_QQ``, ``cov_UU`` or ``cov_VV``; such a column also serves in place of

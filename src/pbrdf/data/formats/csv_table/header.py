@@ -24,7 +24,7 @@ def statements(table: Table) -> dict[str, str]:
     stated = {}
     for line, comment in table.comments:
         statement = re.fullmatch(rf"#\s*({ATTRIBUTE_NAME})\s*:(?!//)(.*)", comment)
-        if statement and line < table.names_line:
+        if statement and line < table.statements_end:
             key, value = statement[1], statement[2].strip()
             lowered = key.lower()
             stated[lowered if lowered in (*_OWN_KEYS, *TEXT_ATTRIBUTES) else key] = value

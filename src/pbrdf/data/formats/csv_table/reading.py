@@ -15,7 +15,7 @@ from pbrdf.data.formats.csv_table.writing import write_csv
 from pbrdf.data.formats.declaration import Reader
 from pbrdf.data.validation import check, validate
 from pbrdf.errors import DataError
-from pbrdf.files.delimited import Table, read_table
+from pbrdf.files.delimited import TABLE_EXTENSIONS, Table, read_table
 
 __all__ = ["READER", "read_csv"]
 
@@ -32,6 +32,7 @@ def read_csv(
     illumination: str | Sequence[float] | None = None,
     cosine_weighted: bool | str | None = None,
     angles: str | None = None,
+    sheet: str | None = None,
 ) -> xr.Dataset:
     """Read a CSV table; :mod:`pbrdf.data.formats.csv_table` describes the format.
 
@@ -51,6 +52,8 @@ def read_csv(
         measured. How many is recorded in the attribute ``skipped_rows``.
     quantity, azimuth, stokes, illumination, cosine_weighted, angles
         As the header keys of the same names, for files that do not state them, or state them wrongly.
+    sheet
+        Of a workbook (``.xlsx``, ``.xls``, ``.ods``), where several hold numbers.
 
     Returns
     -------
@@ -63,7 +66,7 @@ def read_csv(
         Names the file, the line (from 1) and the column.
     """
     path = Path(path)
-    table = read_table(path)
+    table = read_table(path, sheet)
     table.require_rows()
     options = {
         "quantity": quantity,
@@ -82,10 +85,12 @@ def read_csv(
     values = {source.variable: column_values(table, source, header) for source in columns}
     names = {c.variable: table.names[c.index] for c in columns if c.index is not None}
     ds = to_dataset(table, header, columns, values, ignored)
+    if table.warnings:
+        ds.attrs["assumptions"] = [*ds.attrs.get("assumptions", ()), *table.warnings]
     lines = table.lines
     if skip_invalid:
         ds, lines = _without_invalid(ds, lines)
-    validate(ds, origin=str(path), lines=lines, columns=names)
+    validate(ds, origin=table.origin, lines=lines, columns=names)
     return ds
 
 
@@ -98,8 +103,9 @@ def _selected(table: Table, where: Mapping[str, str]) -> Table:
                 f"{', '.join(table.names)}"
             )
         index = table.names.index(name)
-        present = sorted({row[index] for row in table.rows})
-        keep = [row for row in keep if table.rows[row][index] == str(text)]
+        cells = table.cells(index)
+        present = sorted(set(cells))
+        keep = [row for row in keep if cells[row] == str(text)]
         if not keep:
             some = ", ".join(map(repr, present[:10])) + (" …" if len(present) > 10 else "")
             raise DataError(f"{table.path}: no row has {text!r} in the column {name!r}; there are {some}")
@@ -119,6 +125,4 @@ def _without_invalid(ds: xr.Dataset, lines: list[int]) -> tuple[xr.Dataset, list
     return kept, [lines[row] for row in keep]
 
 
-READER = Reader(
-    "csv", read_csv, extensions=(".csv", ".tsv", ".txt", ".dat", ".mat"), write=write_csv, written=(".csv",)
-)
+READER = Reader("csv", read_csv, extensions=TABLE_EXTENSIONS, write=write_csv, written=(".csv",))

@@ -63,7 +63,7 @@ def column_values(table: Table, column: Column, header: Header) -> NDArray[Any]:
 def _labels(table: Table, column: Column) -> NDArray[Any]:
     if column.index is None:
         return np.full(len(table), group_labels(column.constant))
-    cells = [row[column.index] for row in table.rows]
+    cells = table.cells(column.index)
     if "" in cells:
         raise DataError(f"{table.place(cells.index(''), column.index)}: there is no group label")
     return group_labels(cells)
