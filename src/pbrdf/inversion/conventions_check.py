@@ -32,6 +32,8 @@ CONTRADICTED = 0.5
 PLAINLY = 0.1
 _BETTER = {Level.DOES_NOT: 0, Level.IN_PART: 1, Level.DESCRIBES: 2}
 _RADIOMETRIC = ("I", "Q", "U", "V", "mueller")
+_SIGNED = ("Q", "U", "Q_over_I", "U_over_I")
+_MATRICES = ("mueller", "mueller_over_m00")
 
 
 def contradicted_conventions(
@@ -100,7 +102,7 @@ def readings(dataset: xr.Dataset) -> Iterator[tuple[str, str, Callable[[xr.Datas
         option = "theta_r of the other sign" if "no azimuth" in assumed else "--azimuth forward=180"
         option += " (or forward=0 if that was stated)" if stated else ""
         found.append((stated, option, "with forward at the other end of the azimuth", _azimuth))
-    if any(name in dataset for name in ("Q", "U", "aolp", "mueller")):
+    if any(name in dataset for name in (*_SIGNED, *_MATRICES, "aolp")):
         stated = "Q > 0" not in assumed
         option = "--stokes s-p" + (" (or p-s if that was stated)" if stated else "")
         found.append((stated, option, "with Q and U of the other sign", _stokes))
@@ -122,13 +124,14 @@ def _azimuth(dataset: xr.Dataset) -> xr.Dataset:
 
 def _stokes(dataset: xr.Dataset) -> xr.Dataset:
     changed = dataset.copy()
-    for name in ("Q", "U"):
+    for name in _SIGNED:
         if name in changed:
             changed[name] = -changed[name]
     if "aolp" in changed:
         changed["aolp"] = (changed["aolp"].dims, conventions.aolp_swap_sp(changed["aolp"].values))
-    if "mueller" in changed:
-        changed["mueller"] = (changed["mueller"].dims, conventions.mueller_swap_sp(changed["mueller"].values))
+    for name in _MATRICES:
+        if name in changed:
+            changed[name] = (changed[name].dims, conventions.mueller_swap_sp(changed[name].values))
     if COVARIANCE in changed:
         swapped = conventions.covariance_swap_sp(changed[COVARIANCE].values)
         changed[COVARIANCE] = (changed[COVARIANCE].dims, swapped)

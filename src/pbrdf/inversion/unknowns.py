@@ -92,9 +92,10 @@ def _bounds(
         return low, high
     if p.amplitude:
         # an amplitude is on the data's own scale: π times a typical value is its order of magnitude
-        intensity = np.concatenate(
-            [data.values[c] for c, n in enumerate(data.channels) if n in ("I", "m00")] or [np.ones(1)]
-        )
+        measured = [data.values[c] for c, n in enumerate(data.channels) if n in ("I", "m00")]
+        if not measured:  # ratios set an amplitude against the facets, whose scale is absolute
+            return cls.fit_bounds(p, options)
+        intensity = np.concatenate(measured)
         positive = intensity[intensity > 0.0]
         scale = math.pi * float(np.median(positive)) if positive.size else 1.0
         return max(1e-3 * scale, p.domain[0]), min(1e3 * scale, p.domain[1])

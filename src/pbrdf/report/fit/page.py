@@ -213,13 +213,19 @@ def _predicted(report: Report) -> Iterator[Markup]:
 
 
 def _error_table(caption: str, by_region: Mapping[str, Prediction]) -> Markup:
+    intensity = any(math.isfinite(p.intensity_rms) for p in by_region.values())
     polarised = any(math.isfinite(p.dolp_rms) for p in by_region.values())
-    headings = ["region", "geometries", "intensity: median", "rms", "largest"]
+    ratios = any(math.isfinite(p.ratio_rms) for p in by_region.values())
+    headings = ["region", "geometries", *(["intensity: median", "rms", "largest"] if intensity else [])]
     headings += ["DoLP: rms", "largest"] if polarised else []
+    headings += ["ratios: rms", "largest"] if ratios else []
     rows = []
     for region, p in by_region.items():
-        row = [region, str(p.count), *map(per_cent, (p.intensity_median, p.intensity_rms, p.intensity_max))]
-        rows.append(row + ([brief(p.dolp_rms, 2), brief(p.dolp_max, 2)] if polarised else []))
+        row = [region, str(p.count)]
+        if intensity:
+            row += map(per_cent, (p.intensity_median, p.intensity_rms, p.intensity_max))
+        row += [brief(p.dolp_rms, 2), brief(p.dolp_max, 2)] if polarised else []
+        rows.append(row + ([brief(p.ratio_rms, 2), brief(p.ratio_max, 2)] if ratios else []))
     return table(caption, headings, rows, numeric=range(1, len(headings)))
 
 
@@ -283,7 +289,7 @@ def _worst_table(report: Report) -> Markup:
                 str(comparison["group"].values[at]),
                 *angles,
                 *wavelength,
-                channel,
+                channel.replace("_over_", "/"),
                 brief(measured, 3),
                 brief(modelled, 3),
                 brief(float(size[at]), 3),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -9,6 +10,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from pbrdf.inversion.holdout import Prediction
     from pbrdf.report.fit.subject import Report
 
 __all__ = ["Picture", "pictures"]
@@ -47,9 +49,7 @@ def pictures(report: Report) -> Iterator[Picture]:
     result = report.result
     what = f"{result.model.name} and {result.comparison.sizes['geometry']} measured geometries"
     errors = result.predicted or result.fitted
-    found = (
-        f"median error of the intensity {_median(errors)} ({'held out' if result.predicted else 'fitted'})"
-    )
+    found = f"{_error(errors)} ({'held out' if result.predicted else 'fitted'})"
     yield Picture(
         "figure",
         fit_figure(report),
@@ -91,7 +91,12 @@ def pictures(report: Report) -> Iterator[Picture]:
         )
 
 
-def _median(errors: dict) -> str:  # type: ignore[type-arg]
-    from pbrdf.report.numbers import per_cent
+def _error(errors: dict[str, Prediction]) -> str:
+    """The error of the intensity, or where only ratios were measured, of these."""
+    from pbrdf.report.numbers import brief, per_cent
 
-    return per_cent(errors["all"].intensity_median) if "all" in errors else "–"
+    everything = errors.get("all")
+    if everything is None or math.isfinite(everything.intensity_median):
+        return f"median error of the intensity {per_cent(everything.intensity_median) if everything else '–'}"
+    rms = everything.dolp_rms if math.isfinite(everything.dolp_rms) else everything.ratio_rms
+    return f"rms error of the normalised polarisation {brief(rms, 2)}"

@@ -220,7 +220,7 @@ def _channels(result: FitResult) -> str:
     names = list(result.goodness.r_squared)
     if names[0].startswith("m") and len(names) == 16:
         return "all 16 Mueller elements"
-    return ", ".join("DoLP" if name == "dolp" else name for name in names)
+    return ", ".join("DoLP" if name == "dolp" else name.replace("_over_", "/") for name in names)
 
 
 def _headed(rows: list[tuple[str, list[str]]]) -> Table:
@@ -406,18 +406,27 @@ def _correlation_table(result: FitResult) -> Table:
 
 def _error_table(result: FitResult) -> Table:
     """Errors model − measured by region, of what was fitted and of what was predicted."""
-    polarised = any(math.isfinite(p.dolp_rms) for p in (*result.fitted.values(), *result.predicted.values()))
+    everywhere = (*result.fitted.values(), *result.predicted.values())
+    intensity = any(math.isfinite(p.intensity_rms) for p in everywhere)
+    polarised = any(math.isfinite(p.dolp_rms) for p in everywhere)
+    ratios = any(math.isfinite(p.ratio_rms) for p in everywhere)
     table = bare_table()
     table.add_column("errors,\nmodel − measured", no_wrap=True)
     table.add_column("\nnumber", justify="right")
-    heads = ["intensity\nmedian", "\nrms", "\nlargest", *(["DoLP\nrms", "\nlargest"] if polarised else [])]
+    heads = ["intensity\nmedian", "\nrms", "\nlargest"] if intensity else []
+    heads += ["DoLP\nrms", "\nlargest"] if polarised else []
+    heads += ["ratios\nrms", "\nlargest"] if ratios else []
     for head in heads:
         table.add_column(head, justify="right")
     for what, regions in (("predicted", result.predicted), ("fitted", result.fitted)):
         for region, p in regions.items():
-            cells = [per_cent(p.intensity_median), per_cent(p.intensity_rms), per_cent(p.intensity_max)]
+            cells = []
+            if intensity:
+                cells += [per_cent(p.intensity_median), per_cent(p.intensity_rms), per_cent(p.intensity_max)]
             if polarised:
                 cells += [_dolp(p.dolp_rms), _dolp(p.dolp_max)]
+            if ratios:
+                cells += [_dolp(p.ratio_rms), _dolp(p.ratio_max)]
             style = "bold" if what == "predicted" else None
             table.add_row(f"{what}, {region}", str(p.count), *cells, style=style)
     return table

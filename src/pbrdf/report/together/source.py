@@ -211,11 +211,23 @@ def incidence_of(sources: Sequence[Source], theta_i: float | None) -> float:
 
 
 def measured_names(sources: Sequence[Source]) -> list[str]:
-    """Quantities of Stokes vectors that are drawn: those that were measured, or without data what a model has."""
+    """Quantities of Stokes vectors that are drawn: those that were measured, or without data what a model has.
+
+    Raises
+    ------
+    DataError
+        If none of them was measured.
+    """
     wanted = ("intensity", "Q/I", "U/I", "V/I", "dolp", "aolp")
     if all(source.dataset is None for source in sources):
         return ["intensity", "Q/I", "dolp"]
-    return [name for name in wanted if any(source.channel(name) is not None for source in sources)]
+    names = [name for name in wanted if any(source.channel(name) is not None for source in sources)]
+    if not names:
+        listed = ", ".join(source.name for source in sources)
+        raise DataError(
+            f"{listed}: there are elements of Mueller matrices alone; draw them with --kind mueller"
+        )
+    return names
 
 
 def light_of(sources: Sequence[Source]) -> tuple[float, ...]:

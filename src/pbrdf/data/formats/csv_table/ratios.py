@@ -1,0 +1,122 @@
+"""Columns of normalised polarisation: Q/I, S1/S0, M12/M11 and how else they are written.
+
+A ratio is read from a name that says what was divided by what, with a stroke or the word ``over``: ``Q/I``, ``S1/S0``,
+``q_over_i``, ``M12/M11``, ``m01_over_m00``, ``f_r12/f_r11``. Which element the rows and columns are counted from is
+seen in the divisor: m00 or m11. The quantity ``normalised`` says of the columns I, Q, U, V and m00 … m33 that they are
+divided by the intensity already.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrdf.data import conventions
+from pbrdf.data.schema import NORMALISED, is_ratio
+from pbrdf.errors import DataError
+
+__all__ = [
+    "RATIO_ELEMENTS",
+    "already_divided",
+    "fraction",
+    "gather_ratios",
+    "ratio_variable",
+    "swap_sp_of_ratios",
+]
+
+#: Columns of the elements of mueller_over_m00, row by row.
+RATIO_ELEMENTS = tuple(f"m{i}{j}_over_m00" for i in range(4) for j in range(4))
+
+_STOKES = {"q": "Q", "u": "U", "v": "V", "s1": "Q", "s2": "U", "s3": "V"}
+_INTENSITY = {"q": "i", "u": "i", "v": "i", "s1": "s0", "s2": "s0", "s3": "s0"}
+_DIVISION = re.compile(r"(.+?)(?:/|over)(.+)")
+#: An element: mueller matrices are called m, mm, f_r and, with volumes that scatter, s, p or f.
+_ELEMENT = re.compile(r"(m|mm|mueller|fr|f|s|p|a)([0-4])([0-4])")
+#: How far the intensity of normalised values may be from 1: rounding.
+_ONE = 1e-3
+_PER_CENT = ("%", "percent", "per cent", "pct")
+
+
+def ratio_variable(key: str) -> str | None:
+    """Variable that a column name stands for; None where it is no ratio known here.
+
+    Parameters
+    ----------
+    key
+        The name in lower case without unit, separators and the word for its uncertainty: ``q/i``, ``m12overm11``.
+
+    Returns
+    -------
+    str or None
+        ``Q_over_I``, ``U_over_I``, ``V_over_I``, or ``m00_over_m00`` … ``m33_over_m00``.
+    """
+    division = _DIVISION.fullmatch(key)
+    if division is None:
+        return None
+    part, whole = division.groups()
+    if whole in ("i", "s0") and _INTENSITY.get(part) == whole:
+        return f"{_STOKES[part]}_over_I"
+    upper, lower = _ELEMENT.fullmatch(part), _ELEMENT.fullmatch(whole)
+    if upper is None or lower is None or upper[1] != lower[1] or lower[2] != lower[3]:
+        return None
+    first = int(lower[2])
+    i, j = (int(digit) - first for digit in upper.groups()[1:])
+    if first > 1 or not (0 <= i <= 3 and 0 <= j <= 3):
+        return None
+    return f"m{i}{j}_over_m00"
+
+
+def fraction(values: NDArray[np.float64], variable: str, unit: str | None) -> NDArray[np.float64]:
+    """Values of a column as fractions: those of a ratio that stands in per cent are divided by 100."""
+    in_per_cent = is_ratio(variable.removesuffix("_std")) and (unit or "").strip().lower() in _PER_CENT
+    return values / 100.0 if in_per_cent else values
+
+
+def gather_ratios(values: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """Replace the columns m00_over_m00 … by one array (N, 4, 4); elements without a column are NaN."""
+    rest = {name: value for name, value in values.items() if name not in RATIO_ELEMENTS}
+    elements = {name: value for name, value in values.items() if name in RATIO_ELEMENTS}
+    if elements:
+        missing = np.full(len(next(iter(elements.values()))), np.nan)
+        stacked = np.stack([elements.get(name, missing) for name in RATIO_ELEMENTS], axis=-1)
+        rest["mueller_over_m00"] = stacked.reshape(-1, 4, 4)
+    return rest
+
+
+def already_divided(
+    channels: Mapping[str, NDArray[Any]], std: Mapping[str, NDArray[Any]]
+) -> tuple[dict[str, NDArray[Any]], dict[str, NDArray[Any]]]:
+    """Channels of a file whose quantity is ``normalised``, and their uncertainties, as the ratios that they are.
+
+    Raises
+    ------
+    DataError
+        If the intensity, or m00, is not 1.
+    """
+    own = channels.get("I", channels["mueller"][:, 0, 0] if "mueller" in channels else None)
+    if own is not None and (off := np.abs(own - 1.0) > _ONE).any():
+        name = "I" if "I" in channels else "m00"
+        raise DataError(
+            f"the quantity is stated as {NORMALISED!r}, but {name} is {own[off][0]:.6g}, not 1: state what {name} is "
+            f"(brdf, reflectance_factor, radiance or dn); what is divided by it is called Q/I or m01/m00"
+        )
+    divided = {"Q": "Q_over_I", "U": "U_over_I", "V": "V_over_I", "mueller": "mueller_over_m00"}
+    found = [
+        {divided.get(name, name): value for name, value in part.items() if name != "I"}
+        for part in (channels, std)
+    ]
+    return found[0], found[1]
+
+
+def swap_sp_of_ratios(channels: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """The same channels with Q > 0 and U > 0 counted the other way in the ratios among them."""
+    swapped = dict(channels)
+    for name in swapped.keys() & {"Q_over_I", "U_over_I"}:
+        swapped[name] = -swapped[name]
+    if "mueller_over_m00" in swapped:
+        swapped["mueller_over_m00"] = conventions.mueller_swap_sp(swapped["mueller_over_m00"])
+    return swapped
