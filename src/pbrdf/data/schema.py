@@ -91,6 +91,7 @@ __all__ = [
     "std_name",
     "variable_dims",
     "variable_units",
+    "written",
 ]
 
 DIMENSION = "geometry"
@@ -140,6 +141,11 @@ def std_name(variable: str) -> str:
 def is_ratio(name: str) -> bool:
     """Whether a variable, or a channel of a fit such as ``m01_over_m00``, is free of the scale of the data."""
     return name in RATIOS or "_over_" in name
+
+
+def written(name: str) -> str:
+    """A variable or channel as people write it: ``Q/I`` for ``Q_over_I``."""
+    return name.replace("_over_", "/")
 
 
 def only_ratios(names: Iterable[object]) -> bool:

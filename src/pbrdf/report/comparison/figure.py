@@ -75,7 +75,7 @@ def curves_figure(report: Compared) -> Figure:
                 _models(ax, cut, [c[name][column] for c in curves])
                 _limits(ax, points.channels[name].measured[cut.rows], name)
                 ax.set_ylabel(channel_label(name, points) if column == 0 else "")
-                ax.set_xlabel("angle of incidence θi (°)" if cut.kind == "theta_r" else VIEWING_ANGLE)
+                ax.set_xlabel("angle of incidence θi (°)" if cut.over_incidence else VIEWING_ANGLE)
             alone = comparison.held_out.sum() < comparison.held_out.size and held.all()
             label = ShownCuts(cuts, looks_of(len(cuts)), len(cuts)).label(cut)
             axes[0, column].set_title(label + (" (held out)" if alone else ""))

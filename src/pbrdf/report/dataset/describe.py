@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pbrdf.data.covariance import correlations
-from pbrdf.data.schema import COVARIANCE, NATURAL_LIGHT, NORMALISED, only_ratios
+from pbrdf.data.schema import COVARIANCE, NATURAL_LIGHT, NORMALISED, only_ratios, written
 from pbrdf.data.select import measured_channels
 
 if TYPE_CHECKING:
@@ -43,16 +43,11 @@ def describe(ds: xr.Dataset) -> list[str]:
     kind = "simulated" if ds.attrs.get("simulated") else "measured"
     quantity = NORMALISED if only_ratios(channels) else ds.attrs["quantity"]
     lines.append(
-        f"{kind} {', '.join(map(_in_words, channels))} ({_QUANTITIES[quantity]}), {illumination_in_words(ds)}; "
-        f"standard uncertainties of {', '.join(map(_in_words, uncertain)) if uncertain else 'nothing'}"
+        f"{kind} {', '.join(map(written, channels))} ({_QUANTITIES[quantity]}), {illumination_in_words(ds)}; "
+        f"standard uncertainties of {', '.join(map(written, uncertain)) if uncertain else 'nothing'}"
         f"{_covariances_in_words(ds)}"
     )
     return lines
-
-
-def _in_words(variable: str) -> str:
-    """A variable as it is written: Q/I for Q_over_I."""
-    return variable.replace("_over_", "/")
 
 
 def short_name(name: str, dataset: xr.Dataset) -> str:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pbrdf.data.schema import written
 from pbrdf.inversion.erroranalysis import ErrorStatistics, error_analysis
 from pbrdf.inversion.holdout import Prediction
 from pbrdf.inversion.verdict import Level, Verdict
@@ -289,7 +290,7 @@ def _worst_table(report: Report) -> Markup:
                 str(comparison["group"].values[at]),
                 *angles,
                 *wavelength,
-                channel.replace("_over_", "/"),
+                written(channel),
                 brief(measured, 3),
                 brief(modelled, 3),
                 brief(float(size[at]), 3),

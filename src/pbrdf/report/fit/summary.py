@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pbrdf.data.schema import written
 from pbrdf.inversion.comparison import NEAR_SPECULAR, near_specular_tilt
 from pbrdf.inversion.estimates import Estimate
 from pbrdf.inversion.result import FitResult
@@ -220,7 +221,11 @@ def _channels(result: FitResult) -> str:
     names = list(result.goodness.r_squared)
     if names[0].startswith("m") and len(names) == 16:
         return "all 16 Mueller elements"
-    return ", ".join("DoLP" if name == "dolp" else name.replace("_over_", "/") for name in names)
+    ratios = [name for name in names if name.endswith("_over_m00")]
+    if len(ratios) == 15:
+        names = [name for name in names if name not in ratios]
+        return ", ".join([*names, "all 15 Mueller elements over m00"])
+    return ", ".join("DoLP" if name == "dolp" else written(name) for name in names)
 
 
 def _headed(rows: list[tuple[str, list[str]]]) -> Table:
@@ -322,9 +327,11 @@ def goodness_in_words(result: FitResult) -> list[str]:
     without_signal = [name for name in g.r_squared if _is_noise(result, name)]
     r_squared = {name: value for name, value in g.r_squared.items() if name not in without_signal}
     if r_squared:
-        lines.append("R²: " + ", ".join(f"{name} {_r_squared(value)}" for name, value in r_squared.items()))
+        lines.append(
+            "R²: " + ", ".join(f"{written(name)} {_r_squared(value)}" for name, value in r_squared.items())
+        )
     if without_signal:
-        lines.append(f"within their noise of 0, so without an R²: {', '.join(without_signal)}")
+        lines.append(f"within their noise of 0, so without an R²: {', '.join(map(written, without_signal))}")
     lines.append(
         f"AIC {brief(g.aic, 5)}, BIC {brief(g.bic, 5)} (lower is better, among models of the same data)"
     )
