@@ -394,7 +394,7 @@ def _covariance(ds: xr.Dataset, labels: _Labels) -> Iterator[Issue]:
 def _physics(ds: xr.Dataset, labels: _Labels) -> Iterator[Issue]:
     mueller = "mueller" in ds
     name = "mueller" if mueller else "I"
-    intensity = None
+    intensity = np.full(ds.sizes[DIMENSION], np.nan)
     if mueller or "I" in ds:
         intensity = ds["mueller"].values[:, 0, 0] if mueller else ds["I"].values
         dark = np.flatnonzero(intensity <= 0)
@@ -405,7 +405,7 @@ def _physics(ds: xr.Dataset, labels: _Labels) -> Iterator[Issue]:
                 f"{intensity[dark[0]]:.6g} is not positive",
                 dark,
             )
-    if mueller and len(intensity := ds["mueller"].values[:, 0, 0]) > 1 and np.all(intensity == 1.0):
+    if mueller and len(intensity) > 1 and np.all(intensity == 1.0):
         yield _warning(
             "mueller",
             f"{labels.variable('mueller')}: m00 is 1 at every geometry, as if the matrices were divided by it: then "

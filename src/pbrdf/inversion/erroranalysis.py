@@ -477,8 +477,8 @@ def _structure_sentences(structure: dict[str, Structure]) -> list[str]:
         ]
     return [
         f"The residuals of {written(channel)} are structured ({s.runs} runs of equal sign where "
-        f"{s.expected_runs:.0f} were to be expected, {s.positive} above 0 and {s.negative} below{_uneven(s)}): the model departs from the "
-        "measurement in a way that noise does not explain."
+        f"{s.expected_runs:.0f} were to be expected, {s.positive} above 0 and {s.negative} below{_uneven(s)}): the "
+        "model departs from the measurement in a way that noise does not explain."
         for channel, s in found.items()
     ]
 

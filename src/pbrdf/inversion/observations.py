@@ -10,7 +10,7 @@ import numpy as np
 
 from pbrdf.data.conventions import qu_from_dolp_aolp
 from pbrdf.data.covariance import correlations
-from pbrdf.data.schema import COVARIANCE, NORMALISED
+from pbrdf.data.schema import COVARIANCE, NORMALISED, is_ratio
 from pbrdf.data.select import measured_channels, to_brdf_scale
 from pbrdf.errors import FitError
 from pbrdf.inversion.noise import Noise, NoiseModel
@@ -273,7 +273,9 @@ class Observations:
         message = "covariance of geometry {} is not symmetric and positive definite"
         if not proper.all():
             raise FitError(message.format(int(np.argmin(proper))))
-        scale = 1.0 if self.scale is None else self.scale
+        scale = np.ones(diagonal.shape)
+        if self.scale is not None:
+            scale[[not is_ratio(name) for name in self.channels]] = self.scale
         return replace(
             self,
             std=np.where(measured, np.sqrt(diagonal) * scale, np.inf),

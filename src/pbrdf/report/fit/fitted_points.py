@@ -56,8 +56,8 @@ class FittedPoints:
         dolp = None
         if bare.dolp is not None:
             std = column("dolp_std")
-            names = ("Q_over_I", "U_over_I", "m10_over_m00", "m20_over_m00")
-            entries = {n: (column(f"{n}_measured"), column(f"{n}_std")) for n in names}
+            ratios = ("Q_over_I", "U_over_I", "m10_over_m00", "m20_over_m00")
+            entries = {n: (column(f"{n}_measured"), column(f"{n}_std")) for n in ratios}
             if "dolp_std" not in comparison and (ratio := ratio_dolp(entries)) is not None:
                 std = ratio.std
             elif "dolp_std" not in comparison and "I_std" in comparison:
