@@ -405,11 +405,13 @@ def _physics(ds: xr.Dataset, labels: _Labels) -> Iterator[Issue]:
                 f"{intensity[dark[0]]:.6g} is not positive",
                 dark,
             )
-    if mueller and len(intensity) > 1 and np.all(intensity == 1.0):
+    divided = "the matrices" if mueller else ", ".join(n for n in ("Q", "U", "V") if n in ds)
+    exact = std_name(name) not in ds
+    if divided and exact and len(intensity) > 1 and np.all(intensity == 1.0):
         yield _warning(
-            "mueller",
-            f"{labels.variable('mueller')}: m00 is 1 at every geometry, as if the matrices were divided by it: then "
-            f"they are mueller_over_m00 (read the file with the quantity {NORMALISED})",
+            name,
+            f"{labels.variable(name)}: {'m00' if mueller else 'I'} is 1 at every geometry, as if {divided} were "
+            f"divided by it: then they are ratios (read the file with the quantity {NORMALISED})",
         )
     if "dolp" in ds:
         degree = ds["dolp"].values
@@ -421,10 +423,11 @@ def _physics(ds: xr.Dataset, labels: _Labels) -> Iterator[Issue]:
                 bad,
             )
         return
+    if "mueller_over_m00" in ds:
+        yield from _own_element(ds, labels)
     # Values of any size may meet here; what overflows or divides by zero compares as not excessive.
     with np.errstate(all="ignore"):
         if "mueller_over_m00" in ds:
-            yield from _own_element(ds, labels)
             name, what = "mueller_over_m00", "largest |m_ij|/m00"
             ratio, deviation = _largest_ratio(ds)
         elif mueller:

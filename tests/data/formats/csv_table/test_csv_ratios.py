@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from pbrdf.data import read, write
+from pbrdf.data import check, read, write
 from pbrdf.data.formats.csv_table.ratios import ratio_variable
 from pbrdf.errors import DataError
 
@@ -32,6 +32,9 @@ def table(tmp_path):
         ("q_over_i", "Q_over_I"),
         ("S3_over_S0", "V_over_I"),
         ("V over I", "V_over_I"),
+        ("(U/I)", "U_over_I"),
+        ("Q_norm", "Q_over_I"),
+        ("normalised S2", "U_over_I"),
     ],
 )
 def test_names_of_normalised_stokes_parameters(table, name, variable):
@@ -53,6 +56,9 @@ def test_names_of_normalised_stokes_parameters(table, name, variable):
         ("M44/M11", (3, 3)),
         ("f_r21/f_r11", (1, 0)),
         ("S34/S11", (2, 3)),
+        ("M(1_2)/M(1_1)", (0, 1)),
+        ("M[1 2]/M[1 1]", (0, 1)),
+        ("M₁₂/M₁₁", (0, 1)),
     ],
 )
 def test_the_divisor_says_what_elements_are_counted_from(table, name, place):
@@ -118,12 +124,20 @@ def test_columns_of_stokes_parameters_may_be_stated_as_normalised(table, intensi
         table("theta_i,theta_r,phi,S0,S1\n30,30,0,7,-0.2\n", quantity="normalised")
 
 
+@pytest.mark.parametrize("minus", ["-", "−", "- "])
+def test_a_minus_before_the_name_turns_the_sign_but_not_the_uncertainty(table, minus):
+    """−M12/M11 is how tables of scattering give the degree of linear polarisation."""
+    ds = table(f"theta_i,theta_r,phi,{minus}M12/M11,M12/M11_std\n30,30,0,0.3,0.01\n")
+    assert float(ds["mueller_over_m00"][0, 0, 1]) == -0.3
+    assert float(ds["mueller_over_m00_std"][0, 0, 1]) == 0.01
+
+
 def test_matrices_with_m00_of_1_are_told_to_be_ratios(table):
     text = "theta_i,theta_r,phi,m00,m01\n30,30,0,1,-0.2\n40,40,0,1,-0.3\n"
-    from pbrdf.data import check
-
     (issue,) = [i for i in check(table(text, quantity="brdf")) if i.variable == "mueller"]
     assert "read the file with the quantity normalised" in issue.message
+    stokes = "theta_i,theta_r,phi,I,Q\n30,30,0,1,-0.2\n40,40,0,1,-0.3\n"
+    assert any("as if Q were divided by it" in i.message for i in check(table(stokes, quantity="brdf")))
     ds = table(text, quantity="normalised")
     assert_array_equal(ds["mueller_over_m00"].values[:, 0, 1], [-0.2, -0.3])
 
@@ -135,6 +149,7 @@ def test_one_column_for_both_angles_is_the_mirror_configuration(table):
     for name in ("theta_i", "theta_r"):
         assert_allclose(np.rad2deg(ds[name]), [60, 60])
     assert_array_equal(ds["phi"], [0, 0])
+    assert ds["group"].values.tolist() == ["negative side", "positive side"]
     assert any("mirror direction" in words for words in ds.attrs["assumptions"])
 
 

@@ -61,6 +61,9 @@ def to_dataset(
     assumptions = []
     azimuth = next((column for column in columns if column.variable == "phi"), None)
     if azimuth is None and _in_mirror_direction(columns):
+        turned = values["theta_i"] < 0
+        if "group" not in values and turned.any() and not turned.all():
+            values["group"] = np.where(turned, "negative side", "positive side")
         values["theta_i"] = values["theta_r"] = np.abs(values["theta_i"])
         values["phi"] = np.zeros_like(values["theta_i"])
         assumptions.append(

@@ -89,6 +89,8 @@ class Column:
 def _parse_name(name: str) -> tuple[str | None, str | None, str | None]:
     """Variable, unit and quantity that a column name says, each None if it does not."""
     text = name.strip().lower()
+    if (ratio := ratio_variable(text)) is not None:
+        return ratio, None, None
     unit = None
     bracketed = re.search(r"[\[(]\s*([^\])]*?)\s*[\])]", text)
     if bracketed:
@@ -166,7 +168,8 @@ def resolve_columns(
     for variable in ("theta_i", "theta_r"):
         if variable not in columns:
             raise DataError(
-                f"{path}: there is no column {variable}; name it with column={{{variable!r}: …}}. "
+                f"{path}: there is no column {variable}; name it with column={{{variable!r}: …}}"
+                f"{', that of theta_i for the mirror direction' if variable == 'theta_r' else ''}. "
                 f"The columns are {', '.join(names)}"
             )
     _reject_suspicious(path, ignored, "phi" in columns)

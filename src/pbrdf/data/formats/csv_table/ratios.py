@@ -2,13 +2,15 @@
 
 A ratio is read from a name that says what was divided by what, with a stroke or the word ``over``: ``Q/I``, ``S1/S0``,
 ``q_over_i``, ``M12/M11``, ``m01_over_m00``, ``f_r12/f_r11``. Which element the rows and columns are counted from is
-seen in the divisor: m00 or m11. The quantity ``normalised`` says of the columns I, Q, U, V and m00 … m33 that they are
+seen in the divisor: m00 or m11. ``Q_norm`` and the like are normalised by I. A minus before the name, as in −M12/M11,
+turns the sign. The quantity ``normalised`` says of the columns I, Q, U, V and m00 … m33 that they are
 divided by the intensity already.
 """
 
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Mapping
 from typing import Any
 
@@ -22,9 +24,9 @@ from pbrdf.errors import DataError
 __all__ = [
     "RATIO_ELEMENTS",
     "already_divided",
-    "fraction",
     "gather_ratios",
     "ratio_variable",
+    "ratios_of_column",
     "swap_sp_of_ratios",
 ]
 
@@ -33,6 +35,10 @@ RATIO_ELEMENTS = tuple(f"m{i}{j}_over_m00" for i in range(4) for j in range(4))
 
 _STOKES = {"q": "Q", "u": "U", "v": "V", "s1": "Q", "s2": "U", "s3": "V"}
 _INTENSITY = {"q": "i", "u": "i", "v": "i", "s1": "s0", "s2": "s0", "s3": "s0"}
+_NORMALISED = re.compile(r"([quv]|s[123])norm(?:ali[sz]ed)?|norm(?:ali[sz]ed)?([quv]|s[123])")
+#: What may stand between the parts of a name, a minus before it included.
+_PUNCTUATION = re.compile(r"[\s_.,()\[\]{}\-\u2010-\u2015\u2212]")
+_MINUS = re.compile(r"\s*\(?\s*[-\u2010-\u2015\u2212]")
 _DIVISION = re.compile(r"(.+?)(?:/|over)(.+)")
 #: An element: mueller matrices are called m, mm, f_r and, with volumes that scatter, s, p or f.
 _ELEMENT = re.compile(r"(m|mm|mueller|fr|f|s|p|a)([0-4])([0-4])")
@@ -47,13 +53,17 @@ def ratio_variable(key: str) -> str | None:
     Parameters
     ----------
     key
-        The name in lower case without unit, separators and the word for its uncertainty: ``q/i``, ``m12overm11``.
+        The name without unit and the word for its uncertainty: ``Q/I``, ``m12overm11``, ``M(1,2)/M(1,1)``.
 
     Returns
     -------
     str or None
         ``Q_over_I``, ``U_over_I``, ``V_over_I``, or ``m00_over_m00`` … ``m33_over_m00``.
     """
+    key = _PUNCTUATION.sub("", unicodedata.normalize("NFKC", key).lower())
+    normalised = _NORMALISED.fullmatch(key)
+    if normalised is not None:
+        return f"{_STOKES[normalised[1] or normalised[2]]}_over_I"
     division = _DIVISION.fullmatch(key)
     if division is None:
         return None
@@ -70,10 +80,26 @@ def ratio_variable(key: str) -> str | None:
     return f"m{i}{j}_over_m00"
 
 
-def fraction(values: NDArray[np.float64], variable: str, unit: str | None) -> NDArray[np.float64]:
-    """Values of a column as fractions: those of a ratio that stands in per cent are divided by 100."""
-    in_per_cent = is_ratio(variable.removesuffix("_std")) and (unit or "").strip().lower() in _PER_CENT
-    return values / 100.0 if in_per_cent else values
+def ratios_of_column(
+    values: NDArray[np.float64], variable: str, name: str, unit: str | None
+) -> NDArray[np.float64]:
+    """Values of a column as the ratios that they are: per cent divided by 100, turned by a minus before the name.
+
+    Parameters
+    ----------
+    values
+        What the column holds.
+    variable
+        What it stands for; columns of no ratio are returned as they are.
+    name, unit
+        Its name in the file, empty for a constant, and its unit.
+    """
+    ratio = variable.removesuffix("_std")
+    if not is_ratio(ratio):
+        return values
+    if (unit or "").strip().lower() in _PER_CENT:
+        values = values / 100.0
+    return -values if ratio == variable and ratio != "dolp" and _MINUS.match(name) else values
 
 
 def gather_ratios(values: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
