@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pbrdf.data import conventions
-from pbrdf.data.schema import COVARIANCE
+from pbrdf.data.schema import COVARIANCE, RATIOS
+from pbrdf.inversion.noise import NoiseModel
 from pbrdf.inversion.result import FitResult
 from pbrdf.inversion.suggestions import TIME
 from pbrdf.inversion.trials import Clock, Suggestion, some_of, trial, trial_arguments
@@ -34,6 +35,7 @@ _BETTER = {Level.DOES_NOT: 0, Level.IN_PART: 1, Level.DESCRIBES: 2}
 _RADIOMETRIC = ("I", "Q", "U", "V", "mueller")
 _SIGNED = ("Q", "U", "Q_over_I", "U_over_I")
 _MATRICES = ("mueller", "mueller_over_m00")
+_SHARES = tuple(name for name in RATIOS if name != "aolp")
 
 
 def contradicted_conventions(
@@ -70,6 +72,8 @@ def contradicted_conventions(
     for option, words, change in readings(some):
         if not clock.allows():
             break
+        if change is _ratios_in_percent and arguments.get("noise") is not None:
+            continue  # a stated noise would not shrink with the values
         after = trial(change(some), clock, **arguments)
         if after is None:
             continue
@@ -109,8 +113,10 @@ def readings(dataset: xr.Dataset) -> Iterator[tuple[str, str, Callable[[xr.Datas
     if "I" in dataset or "mueller" in dataset:
         found.append((True, "--cosine-weighted", "divided by cos θ_r", _divided_by_cosine))
         found.append((True, "--not-cosine-weighted", "multiplied by cos θ_r", _multiplied_by_cosine))
-    if "dolp" in dataset and float(np.nanmax(dataset["dolp"].values, initial=0.0)) > 0.0:
-        found.append((True, "DoLP divided by 100", "with DoLP taken as per cent", _dolp_in_percent))
+    ratios = [name for name in _SHARES if name in dataset and np.nan_to_num(dataset[name].values).any()]
+    if ratios:
+        what = "DoLP" if ratios == ["dolp"] else "the ratios"
+        found.append((True, f"{what} divided by 100", f"with {what} taken as per cent", _ratios_in_percent))
     if dataset.attrs.get("quantity") == "reflectance_factor" and dataset.attrs.get("scale") != "arbitrary":
         found.append((True, "values divided by 100", "taken as per cent", _values_in_percent))
     for _, option, words, change in sorted(found, key=lambda item: item[0]):
@@ -165,9 +171,24 @@ def _values_in_percent(dataset: xr.Dataset) -> xr.Dataset:
     return _scaled(dataset, np.full(dataset.sizes["geometry"], 0.01))
 
 
-def _dolp_in_percent(dataset: xr.Dataset) -> xr.Dataset:
+def _ratios_in_percent(dataset: xr.Dataset) -> xr.Dataset:
+    """Ratios over 100 with their uncertainties, also those that a fit assumes: else weights alone would lower χ²."""
     changed = dataset.copy()
-    for column in ("dolp", "dolp_std"):
-        if column in changed:
-            changed[column] = changed[column] / 100.0
+    nothing = np.full(dataset.sizes["geometry"], np.nan)
+    for name in _SHARES:
+        if name not in changed:
+            continue
+        values = changed[name]
+        intensity = dataset["I"].values if "I" in dataset else nothing
+        assumed = NoiseModel().standard_uncertainty(name, intensity, np.ones(len(nothing)))
+        std = np.broadcast_to(assumed.reshape((-1,) + (1,) * (values.ndim - 1)), values.shape)
+        if f"{name}_std" in changed:
+            stated = changed[f"{name}_std"].values
+            std = np.where(np.isnan(stated), std, stated)
+        changed[f"{name}_std"] = (values.dims, std / 100.0)
+        changed[name] = values / 100.0
+    if "mueller_over_m00" in changed:
+        own = changed["mueller_over_m00"].values.copy()
+        own[:, 0, 0] = dataset["mueller_over_m00"].values[:, 0, 0]  # 1, whatever the others are in
+        changed["mueller_over_m00"] = (changed["mueller_over_m00"].dims, own)
     return changed

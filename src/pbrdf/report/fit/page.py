@@ -237,22 +237,26 @@ def _fails(report: Report) -> Iterator[Markup]:
     # those on single groups stand in the table
     yield bullets(s for s in analysis.sentences() if not s.startswith("Group "))
     polarised = analysis.dolp.count > 0
-    if len(analysis.groups) > 1:
-        headings = ["group", "intensity: mean", "standard deviation", "largest", "at"]
+    intensity = analysis.relative.count > 0
+    if len(analysis.groups) > 1 and (intensity or polarised):
+        headings = ["group"]
+        headings += ["intensity: mean", "standard deviation", "largest", "at"] if intensity else []
         headings += ["DoLP: mean", "largest", "at"] if polarised else []
         rows, classes = [], []
         for g in analysis.groups:
-            cells = [g.group + (" (held out)" if g.held_out else ""), *_statistics(g.relative, per_cent)]
+            cells = [g.group + (" (held out)" if g.held_out else "")]
+            cells += _statistics(g.relative, per_cent) if intensity else []
             if polarised:
                 mean, _, largest, where = _statistics(g.dolp, lambda v: brief(v, 2))
                 cells += [mean, largest, where]
             rows.append(cells)
             classes.append("held" if g.held_out else "")
         yield table(
-            "Errors, model − measured, by group; of the intensity relative to the measured one.",
+            "Errors, model − measured, by group"
+            + ("; of the intensity relative to the measured one." if intensity else "."),
             headings,
             rows,
-            numeric=[1, 2, 3, 5, 6],
+            numeric=[i for i, heading in enumerate(headings) if heading not in ("group", "at")],
             classes=classes,
         )
     yield subheading("The geometries that it misses most")
