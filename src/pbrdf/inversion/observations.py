@@ -122,8 +122,11 @@ class Observations:
             uncertainties["Q_over_I"], uncertainties["U_over_I"], turned = _propagated(
                 ds["dolp"].values, ds["aolp"].values, stated["dolp"], stated["aolp"]
             )
-        elif "dolp" in measured:
-            columns["dolp"], uncertainties["dolp"] = ds["dolp"].values, stated["dolp"]
+        if "dolp" in measured:
+            # of light without a measured angle the degree still counts
+            angle = np.isfinite(ds["aolp"].values) if "aolp" in measured else np.zeros(len(scale), dtype=bool)
+            columns["dolp"] = np.where(angle, np.nan, ds["dolp"].values)
+            uncertainties["dolp"] = stated["dolp"]
         intensity = columns.get("m00", columns.get("I", np.full(ds.sizes["geometry"], np.nan)))
         model = noise or NoiseModel()
         if objective == "paper":
