@@ -14,7 +14,7 @@ GLASS = (
     Path(__file__).parents[3] / "shared" / "data" / "glass-ng1" / "schott_ng1_inplane_specular_mueller.csv"
 )
 READ = ("--where", "blocked=0", "--stokes", "s-p", "--column", "theta_r=theta_i_deg")
-SMOOTH = [word for fixed in ("a=0", "k=1", "b=0", "t=0", "sigma=0.01") for word in ("--fix", fixed)]
+SMOOTH = ("--model", "priest-germer", "--fix", "sigma=0.01")
 
 
 @pytest.fixture

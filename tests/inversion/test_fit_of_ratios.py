@@ -234,7 +234,9 @@ def test_measured_glass():
 
 def test_a_degree_without_its_angle_still_counts():
     angles = (np.full(3, 0.5), np.full(3, 0.5), np.zeros(3))
-    dataset = pbrdf.make_dataset(*angles, dolp=[0.4, 0.1, np.nan], aolp=[0.0, np.nan, 0.2], std={"dolp": 0.01})
+    dataset = pbrdf.make_dataset(
+        *angles, dolp=[0.4, 0.1, np.nan], aolp=[0.0, np.nan, 0.2], std={"dolp": 0.01}
+    )
     data = Observations.from_dataset(dataset)
     assert data.channels == ("Q_over_I", "U_over_I", "dolp")
     assert_allclose(data.values, [[0.4, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.1, 0.0]])
