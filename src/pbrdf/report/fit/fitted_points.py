@@ -69,7 +69,9 @@ class FittedPoints:
                     if report.result.data.correlation is None
                     else error_correlation(report.dataset),
                 )
-            dolp = Channel(column("dolp_measured"), std)
+            # where the angle was measured too, the fit has Q/I and U/I for it
+            compared = column("dolp_measured")
+            dolp = Channel(np.where(np.isnan(compared), bare.dolp.measured, compared), std)
         names = [str(n).removesuffix("_measured") for n in comparison if str(n).endswith("_measured")]
         polarised = polarised_quantities(
             {name: column(f"{name}_measured") for name in names},

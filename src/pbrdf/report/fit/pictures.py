@@ -56,13 +56,14 @@ def pictures(report: Report) -> Iterator[Picture]:
         f"Intensity and, where measured, degree of linear polarisation of {what}: {found}.",
         "Points: measured. Lines: the fitted model. Open points and broken lines: held out, not fitted.",
     )
+    elements = next((name for name in result.data.channels if name.startswith("m")), "")
     if (figure := polarisation_figure(report)) is not None:
         yield Picture(
             "polarisation",
             figure,
             f"Polarised light of {what}, a panel for each of {len(figure.axes)} quantities.",
-            "Normalised Mueller elements in their places, m00 itself."
-            if "m00_measured" in result.comparison
+            "Normalised Mueller elements in their places" + (", m00 itself." if elements == "m00" else ".")
+            if elements
             else "Q = Ip − Is: negative as by reflection. The angle of polarisation is drawn where the polarised light "
             "stands out of its noise; 0° is p, 90° is s.",
         )

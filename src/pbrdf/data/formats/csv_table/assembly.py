@@ -152,6 +152,7 @@ def _quantity(table: Table, header: Header, columns: list[Column], ratios: bool)
         raise DataError(
             f"{table.path}: it does not say what was measured; add a line '# quantity: …' or the option "
             f"quantity, one of {', '.join(QUANTITIES)}"
+            + ("" if any(c.variable in ("I", "m00") for c in columns) else " (divided by an intensity)")
         )
     return header.quantity or str(implied)
 
