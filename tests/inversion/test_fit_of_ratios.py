@@ -13,7 +13,8 @@ from pbrdf.data.conventions import dolp_aolp_from_stokes
 from pbrdf.errors import FitError
 from pbrdf.inversion.noise import EqualNoise, InstrumentNoise, NoiseModel
 from pbrdf.inversion.observations import Observations
-from pbrdf.inversion.problem import predict
+from pbrdf.inversion.problem import derivatives, predict
+from pbrdf.inversion.unknowns import space_of, with_terms
 
 SHARED = Path(__file__).parents[3] / "shared" / "data"
 FREE = ("sigma", "n", "a", "k", "b", "t")
@@ -130,8 +131,6 @@ def test_a_gain_moves_no_ratio_and_a_dark_offset_does(paint):
     channels = ("I", "Q_over_I", "m10_over_m00", "m01_over_m00")
     dataset = pbrdf.make_dataset(*angles, quantity="brdf", I=[1.0], Q_over_I=[0.1])
     data = Observations.from_dataset(dataset)
-    from pbrdf.inversion.unknowns import space_of, with_terms
-
     space, _ = space_of(paint, {}, {n: paint.values[n] for n in FREE if n != "a"}, (), {}, {}, data)
     space = with_terms(space, data, {}, {}, ["gain", "dark"], {}, "linear")
     a = paint.values["a"]
@@ -242,3 +241,29 @@ def test_a_degree_without_its_angle_still_counts():
     assert_allclose(data.values, [[0.4, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.1, 0.0]])
     assert_allclose(1.0 / data.std, np.array([[100.0, 0, 0], [100.0, 0, 0], [0, 100.0, 0]]))
     assert data.count == 3
+
+
+def test_derivatives_of_ratios_are_those_of_differences(paint):
+    """With a dark offset, which a ratio feels, in and out of the plane of incidence."""
+    angles = (np.array([0.5, 0.9]), np.array([0.9, 0.6]), np.array([0.3, 2.0]))
+    channels = ("Q_over_I", "U_over_I", "m10_over_m00", "m22_over_m00")
+    data = Observations.from_dataset(pbrdf.make_dataset(*angles, quantity="brdf", I=[1.0, 1.0]))
+    space, _ = space_of(paint, {}, {}, (), {}, {}, data)
+    space = with_terms(space, data, {}, {}, ["dark"], {}, "linear")
+    u = space.to_unknowns(np.array([paint.values[n] for n in FREE] + [0.03]))
+    _, jacobian = derivatives(space, u[None], data, channels)
+    step = 1e-5
+    for i in range(len(u)):
+        ends = [predict(space, u + sign * step * np.eye(len(u))[i], data, channels) for sign in (1.0, -1.0)]
+        slope = np.stack([(ends[0][c] - ends[1][c]) / (2.0 * step) for c in channels], axis=-1)
+        assert_allclose(jacobian[0, :, :, i], slope, rtol=1e-5, atol=1e-7)
+
+
+def test_a_dark_model_has_ratios_of_zero_with_finite_derivatives():
+    """Far outside a narrow lobe without a body there is no light at all in double precision."""
+    angles = (np.array([0.2]), np.array([1.2]), np.array([0.0]))
+    data = Observations.from_dataset(pbrdf.make_dataset(*angles, Q_over_I=[0.1]))
+    fixed = {"a": 0.0, "k": 1.0, "b": 0.0, "t": 0.0, "sigma": 0.005}
+    space, _ = space_of(pbrdf.DoubleGauss, {}, fixed, (), {}, {}, data)
+    values, jacobian = derivatives(space, np.array([[1.5]]), data, ("Q_over_I",))
+    assert values[0, 0, 0] == 0.0 and jacobian[0, 0, 0, 0] == 0.0
