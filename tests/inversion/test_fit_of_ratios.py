@@ -267,3 +267,8 @@ def test_a_dark_model_has_ratios_of_zero_with_finite_derivatives():
     space, _ = space_of(pbrdf.DoubleGauss, {}, fixed, (), {}, {}, data)
     values, jacobian = derivatives(space, np.array([[1.5]]), data, ("Q_over_I",))
     assert values[0, 0, 0] == 0.0 and jacobian[0, 0, 0, 0] == 0.0
+
+
+def test_a_gain_of_ratios_alone_is_refused(paint, directions):
+    with pytest.raises(FitError, match="only ratios were measured"):
+        pbrdf.fit(simulated(paint, directions, "stokes", 0), paint, nuisances=["gain"])

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from pbrdf.data.schema import is_ratio
 from pbrdf.errors import FitError
 from pbrdf.inversion.nuisance import KINDS, Nuisance, check_prior
 from pbrdf.inversion.observations import Observations
@@ -123,6 +124,8 @@ def with_terms(
 
     given_terms = [Nuisance.parse(n) if isinstance(n, str) else n for n in nuisances]
     with_gain = any(n.kind == "gain" for n in given_terms)
+    if with_gain and all(map(is_ratio, data.channels)):
+        raise FitError("nuisance gain: only ratios were measured, which no gain changes; leave it out")
     intensity = [data.values[c] for c, n in enumerate(data.channels) if n in ("I", "m00")]
     positive = np.concatenate(intensity or [np.ones(1)])
     typical = float(np.median(positive[positive > 0.0])) if (positive > 0.0).any() else 1.0
