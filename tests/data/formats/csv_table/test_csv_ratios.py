@@ -160,3 +160,32 @@ def test_files_hold_ratios(table, tmp_path, name):
     again = read(tmp_path / name)
     assert again.identical(ds)
     assert again["mueller_over_m00"].attrs["units"] == "1"
+
+
+@pytest.mark.parametrize("head", ["I,Q,U,DoLP,AoLP,Q/I", "S0,S1,S2,DoLP,AoLP,S1/S0"])
+def test_what_follows_from_stokes_parameters_is_left_out_and_said(table, head):
+    """DoLP 0.5 and AoLP ½ atan2(0.3, 0.4) = 18.435° repeat I = 2, Q = 0.8, U = 0.6."""
+    ds = table(f"theta_i,theta_r,phi,{head}\n30,30,0,2,0.8,0.6,0.5,18.435,0.4\n", quantity="brdf")
+    assert list(ds.data_vars) == ["I", "Q", "U"]
+    said = [words for words in ds.attrs["assumptions"] if "follows from Q, U" in words]
+    assert len(said) == 3
+
+
+def test_what_should_follow_but_does_not_is_told(table):
+    ds = table("theta_i,theta_r,phi,Q/I,U/I,DoLP,AoLP\n30,30,0,0.4,0.3,50,-71.565\n")
+    assert list(ds.data_vars) == ["Q_over_I", "U_over_I"]
+    said = " ".join(ds.attrs["assumptions"])
+    assert "dolp was not used and disagrees with Q/I, U/I, which were, by up to 49.5" in said
+    assert "aolp was not used and disagrees with Q/I, U/I, which were, by up to 90°" in said
+
+
+def test_nothing_that_stands_alone_is_left_out(table):
+    ds = table("theta_i,theta_r,phi,brdf,DoLP,AoLP\n30,30,0,0.4,0.3,10\n")
+    assert set(ds.data_vars) == {"I", "dolp", "aolp"}
+    ds = table("theta_i,theta_r,phi,brdf,Q/I,V/I\n30,30,0,0.4,0.3,0.1\n")
+    assert set(ds.data_vars) == {"I", "Q_over_I", "V_over_I"}
+
+
+def test_a_degree_where_nothing_else_was_measured_is_not_lost(table):
+    with pytest.raises(DataError, match="the variables are I, Q, U, dolp"):
+        table("theta_i,theta_r,phi,brdf,Q,U,DoLP\n30,30,0,2,0.8,0.6,0.5\n30,40,0,2,,,0.3\n")

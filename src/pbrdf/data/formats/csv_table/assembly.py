@@ -14,7 +14,12 @@ from pbrdf.data.build import assemble
 from pbrdf.data.covariance import square
 from pbrdf.data.formats.csv_table.columns import CHANNELS, COVARIANCES, ELEMENTS, Column
 from pbrdf.data.formats.csv_table.header import Header
-from pbrdf.data.formats.csv_table.ratios import already_divided, gather_ratios, swap_sp_of_ratios
+from pbrdf.data.formats.csv_table.ratios import (
+    already_divided,
+    gather_ratios,
+    swap_sp_of_ratios,
+    without_derived,
+)
 from pbrdf.data.schema import NORMALISED, QUANTITIES, RATIOS, only_ratios, std_name
 from pbrdf.errors import DataError
 from pbrdf.files.delimited import Table
@@ -92,6 +97,7 @@ def to_dataset(
             channels, std = already_divided(channels, std)
         except DataError as error:
             raise DataError(f"{table.path}: {error}") from None
+    assumptions += without_derived(channels, std)
     covariance = _gather_covariance(values)
     if "stokes" in header.unstated and channels.keys() & _SIGNED:
         assumptions.append("the file does not say what Q > 0 means; Q = I_p - I_s was assumed")

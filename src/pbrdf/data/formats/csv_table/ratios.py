@@ -18,8 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrdf.data import conventions
-from pbrdf.data.schema import NORMALISED, is_ratio
+from pbrdf.data.schema import NORMALISED, is_ratio, std_name, written
 from pbrdf.errors import DataError
+from pbrdf.optics.angles import within_half_turn
 
 __all__ = [
     "RATIO_ELEMENTS",
@@ -28,6 +29,7 @@ __all__ = [
     "ratio_variable",
     "ratios_of_column",
     "swap_sp_of_ratios",
+    "without_derived",
 ]
 
 #: Columns of the elements of mueller_over_m00, row by row.
@@ -44,6 +46,8 @@ _DIVISION = re.compile(r"(.+?)(?:/|over)(.+)")
 _ELEMENT = re.compile(r"(m|mm|mueller|fr|f|s|p|a)([0-4])([0-4])")
 #: How far the intensity of normalised values may be from 1: rounding.
 _ONE = 1e-3
+#: Rounding up to which a derived column repeats others; light less polarised than this has no angle to compare.
+_ROUNDED, _UNPOLARISED = 0.02, 0.05
 _PER_CENT = ("%", "percent", "per cent", "pct")
 
 
@@ -136,6 +140,49 @@ def already_divided(
         for part in (channels, std)
     ]
     return found[0], found[1]
+
+
+def without_derived(channels: dict[str, NDArray[Any]], std: dict[str, NDArray[Any]]) -> list[str]:
+    """Take out, in place, what only repeats others: DoLP, AoLP and Q/I beside I, Q, U; DoLP and AoLP beside Q/I, U/I.
+
+    Returns
+    -------
+    list of str
+        A sentence on each, which says where it disagrees with what it should follow from.
+    """
+    stokes = [channels.get(name) for name in "IQUV"]
+    ratios: dict[str, NDArray[np.float64]] = {}
+    with np.errstate(all="ignore"):
+        if stokes[0] is not None:
+            ratios = {
+                f"{n}_over_I": v / stokes[0] for n, v in zip("QUV", stokes[1:], strict=True) if v is not None
+            }
+        expected = dict(ratios)
+        whole = ratios or channels
+        if "Q_over_I" in whole and "U_over_I" in whole:
+            shares = np.column_stack([np.ones(len(whole["Q_over_I"])), whole["Q_over_I"], whole["U_over_I"]])
+            expected["dolp"], expected["aolp"] = conventions.dolp_aolp_from_stokes(shares)
+    sentences = []
+    for name in [name for name in expected if name in channels]:
+        if (np.isfinite(channels[name]) & ~np.isfinite(expected[name])).any():
+            continue  # it says more than they do somewhere
+        values = channels.pop(name)
+        std.pop(std_name(name), None)
+        difference = np.abs(values - expected[name])
+        if name == "aolp":
+            difference = np.abs(within_half_turn(values - expected[name], np.pi / 2))
+            difference = np.where(expected["dolp"] < _UNPOLARISED, np.nan, difference)
+        parents = "Q, U" if ratios else "Q/I, U/I"
+        known = difference[np.isfinite(difference)]
+        if known.size and known.max() > _ROUNDED:
+            unit, factor = ("°", np.rad2deg(1.0)) if name == "aolp" else ("", 1.0)
+            sentences.append(
+                f"{written(name)} was not used and disagrees with {parents}, which were, by up to "
+                f"{factor * known.max():.3g}{unit}: check units and signs"
+            )
+        else:
+            sentences.append(f"{written(name)} was not used, as it follows from {parents}")
+    return sentences
 
 
 def swap_sp_of_ratios(channels: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
