@@ -49,6 +49,23 @@ def test_mueller_matrices_and_another_light(run, tmp_path):
     assert tuple(S.attrs["illumination"]) == (1.0, 0.5, 0.0, 0.0)
 
 
+def test_normalised_values_are_those_over_the_intensity(run, tmp_path):
+    small = ("--plane", "--theta-i", "40", "--theta-r", "10,50")
+    for name, more in (
+        ("s.nc", ()),
+        ("q.csv", ("--normalised",)),
+        ("n.csv", ("--mueller", "--normalised", "--noise", "1e-9")),
+    ):
+        run("simulate", "white", *small, *more, "-o", name)
+    S, q, n = (pbrdf.read(tmp_path / name) for name in ("s.nc", "q.csv", "n.csv"))
+    for name in "QUV":
+        np.testing.assert_allclose(q[f"{name}_over_I"], S[name] / S["I"], rtol=1e-12, atol=1e-15)
+    M = n["mueller_over_m00"].values
+    np.testing.assert_allclose(M[:, 1, 0], S["Q"] / S["I"], atol=1e-7)
+    np.testing.assert_array_equal(M[:, 0, 0], 1.0)
+    np.testing.assert_allclose(n["mueller_over_m00_std"].values[:, 1, 0], 1e-9)
+
+
 @pytest.mark.slow
 def test_noise_has_the_stated_size_and_a_seed(run, tmp_path):
     grid = ("simulate", "cd-back", "--theta-i", "40", "--theta-r", "0:80:2", "--phi", "0:355:10")

@@ -1,4 +1,4 @@
-"""Hypothesis strategies for valid data sets of all three forms."""
+"""Hypothesis strategies for valid data sets of all forms."""
 
 from __future__ import annotations
 
@@ -7,11 +7,24 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from pbrdf.data import make_dataset
+from pbrdf.data.schema import QUANTITIES
 
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
 VALUES = FINITE | st.just(np.nan)
 POSITIVE = st.floats(min_value=0, exclude_min=True, allow_infinity=False) | st.just(np.nan)
 NUMBERS = st.integers(-(2**60), 2**60) | FINITE
+FORMS = (
+    ("I",),
+    ("I", "Q", "U", "V"),
+    ("I", "dolp", "aolp"),
+    ("dolp",),
+    ("dolp", "aolp", "V_over_I"),
+    ("mueller",),
+    ("Q_over_I", "U_over_I", "V_over_I"),
+    ("I", "Q_over_I"),
+    ("mueller_over_m00",),
+    ("I", "mueller_over_m00"),
+)
 RESERVED = {"quantity", "stokes_convention", "illumination", "simulated", "assumptions", "scale"}
 RESERVED |= {"title", "source", "reference", "instrument", "azimuth", "stokes", "cosine_weighted", "angles"}
 
@@ -54,16 +67,18 @@ def datasets(draw):
     def column(elements):
         return draw(arrays(np.float64, rows, elements=elements))
 
-    form = draw(st.sampled_from([("I",), ("I", "Q", "U", "V"), ("I", "dolp", "aolp"), ("mueller",)]))
+    form = draw(st.sampled_from(FORMS))
     channels, std = {}, {}
     for name in form:
-        shape = (rows, 4, 4) if name == "mueller" else rows
+        shape = (rows, 4, 4) if name.startswith("mueller") else rows
         elements = st.floats(-3.14, 3.14) | st.just(np.nan) if name == "aolp" else VALUES
         channels[name] = draw(arrays(np.float64, shape, elements=elements))
+        if name == "mueller_over_m00":
+            channels[name][:, 0, 0] = draw(st.sampled_from([1.0, np.nan]))
         if draw(st.booleans()):
             std[name] = draw(arrays(np.float64, shape, elements=POSITIVE))
     covariance = None
-    if form[-1] in "IQUV" and draw(st.booleans()):
+    if set(form) <= set("IQUV") and draw(st.booleans()):
         covariance = covariances(draw, rows, form)
         std = {}
         if draw(st.booleans()):  # stated besides, and not to the last bit the roots of the variances
@@ -78,7 +93,7 @@ def datasets(draw):
         column(zenith_angles()),
         column(zenith_angles()),
         column(azimuths()),
-        quantity=draw(st.sampled_from(["brdf", "reflectance_factor", "radiance", "dn"])),
+        quantity=draw(st.sampled_from(QUANTITIES[:-1] if "I" in form or "mueller" in form else QUANTITIES)),
         std=std,
         covariance=covariance,
         wavelength=column(POSITIVE) if draw(st.booleans()) else None,

@@ -74,7 +74,10 @@ def test_group_labels_that_spell_integers_are_integers(group, stored):
         ({}, "the variables are none"),
         ({"mueller": np.eye(4), "I": 1.0}, "mueller alone"),
         ({"I": 1.0, "Q": 0.1, "dolp": 0.1}, "I with any of Q, U, V"),
-        ({"dolp": 0.1}, "dolp needs I"),
+        ({"Q_over_I": 0.1, "dolp": 0.1}, "dolp, perhaps with"),
+        ({"mueller_over_m00": np.full((4, 4), 0.5)}, "divided by m00, but their own m00 is 0.5"),
+        ({"I": 1.0, "quantity": "normalised"}, "'normalised', for ratios alone, but there is I"),
+        ({"I": 1.0, "quantity": None}, "state the quantity"),
     ],
 )
 def test_what_does_not_fit_is_refused_in_words(arguments, words):

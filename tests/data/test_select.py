@@ -17,6 +17,26 @@ def test_channels_without_any_value_are_not_measured():
     assert measured_channels(make_dataset(0.1, 0.5, 0.0, quantity="brdf", mueller=np.eye(4))) == ("mueller",)
 
 
+@pytest.mark.parametrize("quantity", ["reflectance_factor", "radiance", "dn"])
+def test_no_conversion_of_the_intensity_touches_the_ratio_beside_it(quantity):
+    M = np.full((4, 4), 0.25)
+    M[0, 0] = 1.0
+    ds = make_dataset(
+        THETA_I, 0.5, 0.0, quantity=quantity, I=3.0, mueller_over_m00=M, std={"mueller_over_m00": 0.01}
+    )
+    brdf = to_brdf_scale(ds)
+    assert not np.allclose(brdf["I"], ds["I"])
+    for name in ("mueller_over_m00", "mueller_over_m00_std"):
+        assert_array_equal(brdf[name], ds[name])
+    assert measured_channels(ds) == ("I", "mueller_over_m00")
+
+
+def test_ratios_alone_are_normalised_and_stay_so():
+    ds = make_dataset(THETA_I, 0.5, 0.0, Q_over_I=-0.1)
+    assert ds.attrs["quantity"] == "normalised"
+    assert to_brdf_scale(ds).identical(ds)
+
+
 def test_reflectance_factor_is_divided_by_pi_with_its_uncertainty():
     ds = make_dataset(
         THETA_I,

@@ -159,7 +159,7 @@ def test_dolp_alone_is_fitted_as_dolp():
         assert result.estimates[name].value == pytest.approx(model.values[name], rel=1e-3)
 
 
-def test_dolp_with_aolp_is_fitted_as_signed_q_and_u():
+def test_dolp_with_aolp_is_fitted_as_signed_shares():
     model = pbrdf.DoubleGauss(0.06, 1.6, 0.5, 1.2, 0.2, 0.7)
     angles = in_plane([25, 50], np.arange(-70, 75, 7))
     stokes = model.stokes(*angles)
@@ -167,8 +167,9 @@ def test_dolp_with_aolp_is_fitted_as_signed_q_and_u():
         *angles, quantity="brdf", I=stokes[:, 0], dolp=pbrdf.dolp(stokes), aolp=pbrdf.aolp(stokes)
     )
     data = Observations.from_dataset(dataset)
-    assert data.channels == ("I", "Q", "U")
-    np.testing.assert_allclose(data.values, stokes[:, :3].T, atol=1e-15)
+    assert data.channels == ("I", "Q_over_I", "U_over_I")
+    shares = stokes[:, 1:3] / stokes[:, :1]
+    np.testing.assert_allclose(data.values, np.column_stack([stokes[:, :1], shares]).T, atol=1e-15)
 
 
 def test_polarised_illumination_enters_the_model():

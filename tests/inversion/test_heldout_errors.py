@@ -45,6 +45,17 @@ def test_degree_of_polarisation_alone_is_compared_as_it_is():
     assert score(errors) == pytest.approx(math.sqrt((0.01 + 0.04) / 2))
 
 
+def test_ratios_are_compared_as_they_are_with_and_without_an_intensity():
+    columns = {"Q_over_I_measured": [0.1, 0.3], "Q_over_I_modelled": [0.2, 0.1]}
+    alone = PointErrors.of(table(**columns), ("Q_over_I",), np.ones(2, bool))
+    assert math.isnan(alone.intensity_median)
+    np.testing.assert_allclose(alone.polarised, [[0.1, -0.2]])
+    beside = table(I_measured=[8.0, np.nan], I_modelled=[4.0, 4.0], **columns)
+    errors = PointErrors.of(beside, ("I", "Q_over_I"), np.ones(2, bool))
+    np.testing.assert_allclose(errors.polarised, [[0.1, -0.2]])  # also where no intensity was measured
+    np.testing.assert_allclose(errors.intensity, [-0.5, np.nan])
+
+
 def test_enough_folds_are_the_units():
     fold = np.repeat([3, 5, 9, 11, 12, 40], 4)
     unit, words = units_of(fold, *np.zeros((3, 24)))

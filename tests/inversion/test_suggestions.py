@@ -213,6 +213,42 @@ def test_every_reading_undoes_itself_or_its_opposite():
         assert any(not np.allclose(once[n], dataset[n]) for n in ("phi", "Q", "I"))
 
 
+def shares(dataset):
+    """The same data as ratios, and the full matrices of the paint over m00."""
+    ratios = {f"{c}_over_I": (dataset[c] / dataset["I"]).values for c in "QU"}
+    angles = [dataset[name].values for name in ("theta_i", "theta_r", "phi")]
+    M = np.asarray(PAINT.mueller(*angles))
+    return pbrdf.make_dataset(*angles, **ratios), pbrdf.make_dataset(
+        *angles, mueller_over_m00=M / M[:, :1, :1]
+    )
+
+
+def test_ratios_have_readings_of_sign_and_per_cent_and_none_of_scale():
+    for dataset in shares(measured()):
+        change = {option.split(" (")[0]: how for option, _, how in readings(dataset)}
+        assert not [option for option in change if "cosine" in option or option.startswith("values")]
+        name = next(iter(dataset.data_vars))
+        swapped = change["--stokes s-p"](dataset)
+        xr.testing.assert_equal(change["--stokes s-p"](swapped), dataset)
+        q, again = (
+            ds[name].values if ds[name].ndim == 1 else ds[name].values[:, 1, 0] for ds in (dataset, swapped)
+        )
+        np.testing.assert_array_equal(again, -q)
+        pbrdf.validate(change["the ratios divided by 100"](dataset))
+
+
+@pytest.mark.slow
+def test_a_wrong_sign_of_shares_is_named():
+    dataset = shares(measured())[0]
+    wrong = dataset.assign(Q_over_I=-dataset["Q_over_I"], U_over_I=-dataset["U_over_I"])
+    arguments = {"fix": {"k": 1.1, "b": 0.2}}
+    result = pbrdf.fit(wrong, starts=4, **arguments)
+    assert result.verdict().level != Level.DESCRIBES
+    assert contradicted_conventions(wrong, result, arguments, until=math.inf)[0].option.startswith(
+        "--stokes s-p"
+    )
+
+
 def made_up(errors, level=Level.IN_PART, chi2=None):
     """Trials whose error is looked up by what was asked for, instead of fits."""
 

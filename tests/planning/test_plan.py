@@ -16,7 +16,7 @@ from pbrdf.instruments.polarimeter.expected_noise import expected_covariance
 from pbrdf.instruments.polarimeter.presets import preset
 from pbrdf.inversion.noise import InstrumentNoise
 from pbrdf.inversion.observations import Observations
-from pbrdf.inversion.problem import Space, residuals
+from pbrdf.inversion.problem import Space, derivatives, residuals
 from pbrdf.inversion.solver import solve
 from pbrdf.optics.elements import rotate_frame
 from pbrdf.planning.candidates import in_plane_candidates, out_of_plane_candidates
@@ -71,6 +71,35 @@ def test_information_is_that_of_a_fit_at_the_truth(model):
     made = plan(model, NOISE, 63, reference=protocol, repeats=63, starts=1)
     for name, std in zip(made.names, made.reference_std, strict=True):
         assert std == pytest.approx(result.estimates[name].std, rel=1e-5), name
+
+
+def test_information_of_ratios_is_what_an_unknown_scale_of_every_reading_leaves():
+    """Schur's complement: a free factor of I, Q, U, V at each geometry, marginalised."""
+    protocol, space = Protocol.in_plane(), space_of(THICK)
+    unknowns = unknowns_of(space, THICK)
+    found = information(space, unknowns, [protocol], PAPER, pixels=100, normalised=True)[0]
+    blank = np.zeros((4, len(protocol)))
+    data = Observations(
+        protocol.theta_i,
+        protocol.theta_r,
+        protocol.phi,
+        tuple("IQUV"),
+        blank,
+        blank + 1.0,
+        (1.0, 0.0, 0.0, 0.0),
+        True,
+    )
+    values, jacobian = (a[0] for a in derivatives(space, unknowns, data, "IQUV"))
+    cosine = np.cos(protocol.theta_i)
+    turned = PAPER.reference_angle + protocol.reference_angle
+    spread = expected_covariance(PAPER, values * cosine[:, None], reference_angle=turned, pixels=100)
+    seen = np.flatnonzero(PAPER.polarimeter.determined)
+    for g in range(0, len(protocol), 7):
+        C = spread[g][np.ix_(seen, seen)] / cosine[g] ** 2
+        J = np.column_stack([jacobian[g, seen], values[g, seen]])
+        full = J.T @ np.linalg.solve(C, J)
+        left = full[:-1, :-1] - np.outer(full[:-1, -1], full[-1, :-1]) / full[-1, -1]
+        np.testing.assert_allclose(found[g], left, atol=1e-8 * np.abs(full[:-1, :-1]).max())
 
 
 @pytest.mark.slow

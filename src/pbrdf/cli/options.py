@@ -190,7 +190,7 @@ _READING: dict[str, tuple[Any, Any]] = {
     "quantity": (
         _reading_option(
             str | None,
-            "What the values are, if the file does not say: brdf, reflectance_factor, radiance, dn.",
+            "What the values are, if the file does not say: brdf, reflectance_factor, radiance, dn, normalised.",
         ),
         None,
     ),

@@ -61,6 +61,12 @@ def plan(
             help="Standard error of the sample angle (out of plane of its tilt too), degrees.", min=0.0
         ),
     ] = 0.0,
+    normalised: Annotated[
+        bool,
+        typer.Option(
+            "--normalised", help="Count Q/I, U/I and V/I alone: the scale of the readings is unknown."
+        ),
+    ] = False,
     camera_positions: Annotated[
         int | None, typer.Option(help="Use so many camera positions only.", show_default="any number", min=1)
     ] = None,
@@ -146,6 +152,7 @@ def plan(
             repeats=repeats,
             pixels=pixels,
             angle_error=math.radians(angle_error),
+            normalised=normalised,
             seed=seed,
             progress=progress,
         )

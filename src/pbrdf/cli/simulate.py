@@ -64,6 +64,9 @@ def simulate(
         str, typer.Option(help="Stokes vector of the source, I,Q,U,V.", metavar="STOKES")
     ] = "natural",
     mueller: Annotated[bool, typer.Option("--mueller", help="Write full Mueller matrices.")] = False,
+    normalised: Annotated[
+        bool, typer.Option("--normalised", help="Write Q/I, U/I and V/I, or matrices over m00, without I.")
+    ] = False,
     wavelength: WrittenWavelength = None,
     noise: Annotated[
         str | None,
@@ -106,14 +109,14 @@ def simulate(
     model = open_single_model(source)
 
     directions = directions_of(theta_i, theta_r, phi, plane, bistatic)
-    columns, std = _evaluate(model, directions, light, mueller, stated, seed)
+    columns, std = _evaluate(model, directions, light, (mueller, normalised), stated, seed)
     if wavelength is None:
         wavelength = known_wavelength(source)
     dataset = make_dataset(
         directions["theta_i"],
         directions["theta_r"],
         directions["phi"],
-        quantity="brdf",
+        quantity=None if normalised else "brdf",
         **columns,
         std=std,
         wavelength=wavelength,
@@ -134,14 +137,18 @@ def _evaluate(
     model: Model,
     directions: dict[str, np.ndarray],
     light: tuple[float, ...],
-    mueller: bool,
+    form: tuple[bool, bool],
     noise: Any,
     seed: int,
 ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
-    """Values by the names of the schema, and their standard uncertainties if noise was added."""
+    """Values by the names of the schema, and their standard uncertainties if noise was added.
+
+    ``form``: whether matrices are asked for, and whether divided by the intensity.
+    """
     import numpy as np
 
     where = (directions["theta_i"], directions["theta_r"], directions["phi"])
+    mueller, normalised = form
     if mueller:
         columns = {"mueller": np.asarray(model.mueller(*where))}
         intensity = columns["mueller"][:, 0, 0]
@@ -149,18 +156,29 @@ def _evaluate(
         stokes = np.asarray(model.stokes(*where, incident=light))
         columns = {name: stokes[:, i] for i, name in enumerate("IQUV")}
         intensity = columns["I"]
+    over = ""
+    if normalised:
+        over = "_over_m00" if mueller else "_over_I"
+        columns = {
+            f"{name}{over}": values / intensity.reshape((-1,) + (1,) * (values.ndim - 1))
+            for name, values in columns.items()
+            if name != "I"
+        }
     if noise is None:
         return columns, {}
     draw = np.random.default_rng(seed)
     exact = np.ones_like(intensity)
     std = {}
     for name, values in columns.items():
-        if name == "mueller":
+        if mueller:
             widths = [
-                [noise.standard_uncertainty(f"m{i}{j}", intensity, exact) for j in range(4)] for i in range(4)
+                [noise.standard_uncertainty(f"m{i}{j}{over}", intensity, exact) for j in range(4)]
+                for i in range(4)
             ]
             std[name] = np.moveaxis(np.array(widths), -1, 0)
         else:
             std[name] = noise.standard_uncertainty(name, intensity, exact)
         columns[name] = values + std[name] * draw.standard_normal(values.shape)
+        if mueller and normalised:
+            columns[name][:, 0, 0] = 1.0
     return columns, std

@@ -14,9 +14,11 @@ from pbrdf.data.schema import (
     COVARIANCE,
     DIMENSION,
     NATURAL_LIGHT,
+    NORMALISED,
     QUANTITIES,
     STOKES_AXES,
     VARIABLES,
+    only_ratios,
     spells_integer,
     std_name,
     variable_dims,
@@ -34,7 +36,7 @@ def make_dataset(
     theta_r: ArrayLike,
     phi: ArrayLike,
     *,
-    quantity: str,
+    quantity: str | None = None,
     I: ArrayLike | None = None,  # noqa: E741
     Q: ArrayLike | None = None,
     U: ArrayLike | None = None,
@@ -42,6 +44,10 @@ def make_dataset(
     dolp: ArrayLike | None = None,
     aolp: ArrayLike | None = None,
     mueller: ArrayLike | None = None,
+    Q_over_I: ArrayLike | None = None,
+    U_over_I: ArrayLike | None = None,
+    V_over_I: ArrayLike | None = None,
+    mueller_over_m00: ArrayLike | None = None,
     std: Mapping[str, ArrayLike] | None = None,
     covariance: ArrayLike | None = None,
     wavelength: ArrayLike | None = None,
@@ -52,19 +58,25 @@ def make_dataset(
 ) -> xr.Dataset:
     """Build and validate a data set; :mod:`pbrdf.data.schema` says what its parts mean.
 
-    Give one of the three forms: `I` with any of `Q`, `U`, `V`; `I` with `dolp` and perhaps `aolp`; or
-    `mueller`. NaN marks what was not measured.
+    Give one of the five forms: `I` with any of `Q`, `U`, `V`; `dolp`, perhaps with `aolp`, `V_over_I` and `I`;
+    `mueller`; any of `Q_over_I`, `U_over_I`, `V_over_I`, perhaps with `I`; or `mueller_over_m00`, perhaps with `I`.
+    NaN marks what was not measured.
 
     Parameters
     ----------
     theta_i, theta_r, phi
         Angles in radians, φ = 0 forward; scalars or shape (N,), broadcast against each other.
     quantity
-        ``"brdf"`` (1/sr), ``"reflectance_factor"``, ``"radiance"`` or ``"dn"``.
+        ``"brdf"`` (1/sr), ``"reflectance_factor"``, ``"radiance"``, ``"dn"`` or, for ratios alone, ``"normalised"``,
+        for which None stands.
     I, Q, U, V, dolp, aolp
         Shape (N,) or scalars. Q = I_p − I_s; `aolp` in radians.
     mueller
         Shape (N, 4, 4), indexed [row, outgoing Stokes, incident Stokes].
+    Q_over_I, U_over_I, V_over_I
+        Normalised Stokes parameters, shape (N,) or scalars.
+    mueller_over_m00
+        Mueller matrices divided by their element m00, shape (N, 4, 4).
     std
         Standard uncertainties by the name of the variable they belong to, in that variable's unit and
         shape (or broadcast to it).
@@ -102,7 +114,13 @@ def make_dataset(
     2
     """
     given = {"I": I, "Q": Q, "U": U, "V": V, "dolp": dolp, "aolp": aolp, "mueller": mueller}
+    given |= {"Q_over_I": Q_over_I, "U_over_I": U_over_I, "V_over_I": V_over_I}
+    given["mueller_over_m00"] = mueller_over_m00
     channels = {name: value for name, value in given.items() if value is not None}
+    if quantity is None:
+        if not only_ratios(channels):
+            raise DataError(f"state the quantity, one of {', '.join(QUANTITIES)}")
+        quantity = NORMALISED
     ds = assemble(
         {"theta_i": theta_i, "theta_r": theta_r, "phi": phi, "wavelength": wavelength, "group": group},
         channels,
@@ -211,7 +229,7 @@ def _row_count(arrays: Mapping[str, ArrayLike | None]) -> int:
     lengths = set()
     for name, value in arrays.items():
         shape = np.shape(value) if value is not None else ()
-        if len(shape) == (3 if name in ("mueller", COVARIANCE) else 1):
+        if len(shape) == (3 if name in ("mueller", "mueller_over_m00", COVARIANCE) else 1):
             lengths.add(shape[0])
     return max(lengths - {1}, default=1)
 

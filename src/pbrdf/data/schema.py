@@ -15,12 +15,20 @@ Coordinates along ``geometry``
         What was measured together, for example one camera position: integers, or text without line
         breaks and surrounding white space. 0 everywhere when nothing was stated.
 
-Data variables: exactly one of three forms
+Data variables: exactly one of five forms
     (a) Stokes parameters of the reflected light under the stated illumination: ``I`` and any of ``Q``,
         ``U``, ``V``;
-    (b) ``I`` with ``dolp`` (degree of linear polarisation) and, optionally, ``aolp`` (its angle, radians);
+    (b) ``dolp`` (degree of linear polarisation), with or without ``aolp`` (its angle, radians), ``V_over_I`` and
+        ``I``;
     (c) ``mueller`` with the dimensions (``geometry``, ``stokes_out``, ``stokes_in``), whose coordinates
-        are I, Q, U, V.
+        are I, Q, U, V;
+    (d) normalised Stokes parameters: any of ``Q_over_I``, ``U_over_I``, ``V_over_I``, with or without ``I``;
+    (e) ``mueller_over_m00``, the Mueller matrix divided by its element m00, of the dimensions of ``mueller``, with
+        or without ``I`` (the intensity under the stated illumination). Its own element m00 is 1 or NaN and says
+        nothing.
+
+    Ratios (dolp, aolp and what has ``over`` in its name) are free of any factor common to all channels: no
+    conversion of the quantity, no cosine and no gain touches them.
 
     Each may have a standard uncertainty of the same shape in the variable ``<name>_std``, > 0. NaN means
     *not measured here*, and, in an uncertainty, *not known*.
@@ -36,12 +44,13 @@ Attributes
     ``quantity``
         ``"brdf"`` (1/sr), ``"reflectance_factor"`` (π · BRDF, 1), ``"radiance"`` (arbitrary units,
         proportional to BRDF · cos θ_i) or ``"dn"`` (the same, digital numbers of a camera). It describes
-        I, Q, U, V and the Mueller matrix.
+        I, Q, U, V and the Mueller matrix. ``"normalised"``: there are only ratios (where a file that holds only
+        ratios states another quantity, that is kept and describes nothing).
     ``stokes_convention``
         Always ``"p-s"``: Q = I_p − I_s, (p, s, k) right-handed. Readers convert.
     ``illumination``
         Stokes vector of the source, four numbers; ``[1, 0, 0, 0]`` is natural light. It applies to forms
-        (a) and (b).
+        (a), (b) and (d), and to the I of (e).
     ``simulated``
         1 if a model produced the numbers, else 0.
     ``title``, ``source``, ``reference``, ``instrument`` (optional)
@@ -56,6 +65,8 @@ Further attributes are kept if they are text, finite numbers or lists of these.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 __all__ = [
@@ -67,31 +78,46 @@ __all__ = [
     "FILE_KEYS",
     "FORMS",
     "NATURAL_LIGHT",
+    "NORMALISED",
     "QUANTITIES",
+    "RATIOS",
     "STOKES_AXES",
     "TEXT_ATTRIBUTES",
     "UNITS",
     "VARIABLES",
+    "is_ratio",
+    "only_ratios",
     "spells_integer",
     "std_name",
     "variable_dims",
     "variable_units",
+    "written",
 ]
 
 DIMENSION = "geometry"
 NATURAL_LIGHT = (1.0, 0.0, 0.0, 0.0)
 
-QUANTITIES = ("brdf", "reflectance_factor", "radiance", "dn")
+#: The quantity of data that hold ratios only.
+NORMALISED = "normalised"
+QUANTITIES = ("brdf", "reflectance_factor", "radiance", "dn", NORMALISED)
 COORDINATES = ("theta_i", "theta_r", "phi", "wavelength", "group")
-VARIABLES = ("I", "Q", "U", "V", "dolp", "aolp", "mueller")
+#: Variables that no common factor of the channels changes: they say nothing about the scale of the data.
+RATIOS = ("dolp", "aolp", "Q_over_I", "U_over_I", "V_over_I", "mueller_over_m00")
+VARIABLES = ("I", "Q", "U", "V", "dolp", "aolp", "mueller", *RATIOS[2:])
 
 #: The variable that holds the covariance of the Stokes components.
 COVARIANCE = "covariance"
 #: Coordinates that count Stokes components: of Mueller matrices, then of covariances.
 STOKES_AXES = ("stokes_out", "stokes_in", "stokes_row", "stokes_column")
 
-#: The three forms of a data set: the variable that makes the form, and those that may stand beside it.
-FORMS = (("I", ("Q", "U", "V")), ("dolp", ("I", "aolp")), ("mueller", ()))
+#: The forms of a data set: variables of which any makes the form, and those that may stand beside it.
+FORMS = (
+    (("I",), ("Q", "U", "V")),
+    (("dolp",), ("I", "aolp", "V_over_I")),
+    (("mueller",), ()),
+    (("Q_over_I", "U_over_I", "V_over_I"), ("I",)),
+    (("mueller_over_m00",), ("I",)),
+)
 
 #: Variables in radians; files hold them in degrees.
 ANGLES = ("theta_i", "theta_r", "phi", "aolp", "aolp_std")
@@ -104,7 +130,7 @@ FILE_KEYS = ("azimuth", "stokes", "cosine_weighted", "angles")
 #: What an attribute may be called, so that every file format can hold it.
 ATTRIBUTE_NAME = r"[A-Za-z_][A-Za-z0-9_.-]*"
 
-UNITS = {"brdf": "1/sr", "reflectance_factor": "1", "radiance": "arbitrary", "dn": "1"}
+UNITS = {"brdf": "1/sr", "reflectance_factor": "1", "radiance": "arbitrary", "dn": "1", NORMALISED: "1"}
 
 
 def std_name(variable: str) -> str:
@@ -112,9 +138,24 @@ def std_name(variable: str) -> str:
     return f"{variable}_std"
 
 
+def is_ratio(name: str) -> bool:
+    """Whether a variable, or a channel of a fit such as ``m01_over_m00``, is free of the scale of the data."""
+    return name in RATIOS or "_over_" in name
+
+
+def written(name: str) -> str:
+    """A variable or channel as people write it: ``Q/I`` for ``Q_over_I``."""
+    return name.replace("_over_", "/")
+
+
+def only_ratios(names: Iterable[object]) -> bool:
+    """Whether none of the data variables of these names has the unit of the quantity."""
+    return not any(name in VARIABLES and not is_ratio(str(name)) for name in names)
+
+
 def variable_dims(variable: str) -> tuple[str, ...]:
     """Dimensions of a data variable, of its uncertainty or of the covariance."""
-    if variable in ("mueller", "mueller_std"):
+    if variable.removesuffix("_std") in ("mueller", "mueller_over_m00"):
         return (DIMENSION, *STOKES_AXES[:2])
     if variable == COVARIANCE:
         return (DIMENSION, *STOKES_AXES[2:])
@@ -128,7 +169,7 @@ def variable_units(variable: str, quantity: str) -> str:
         return "rad"
     if base == "wavelength":
         return "nm"
-    if base == "dolp":
+    if is_ratio(base):
         return "1"
     if base == "group":
         return ""

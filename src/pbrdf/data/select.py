@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pbrdf.data.conventions import reflectance_factor_to_brdf, remove_cosine_weight
 from pbrdf.data.covariance import derived_variance
-from pbrdf.data.schema import COVARIANCE, VARIABLES, std_name, variable_units
+from pbrdf.data.schema import COVARIANCE, NORMALISED, VARIABLES, std_name, variable_units
 from pbrdf.errors import DataError
 from pbrdf.optics.stokes import STOKES
 
@@ -21,7 +21,7 @@ WAVELENGTH_TOLERANCE = 0.5
 
 
 def measured_channels(ds: xr.Dataset) -> tuple[str, ...]:
-    """Names of the data variables with at least one value, in the order I, Q, U, V, dolp, aolp, mueller."""
+    """Names of the data variables with at least one value, in the order of the schema."""
     return tuple(
         name for name in VARIABLES if name in ds.data_vars and bool(np.any(~np.isnan(ds[name].values)))
     )
@@ -31,8 +31,8 @@ def to_brdf_scale(ds: xr.Dataset) -> xr.Dataset:
     """The same data as a BRDF, uncertainties and covariances included.
 
     A reflectance factor is divided by π, radiance and digital numbers by cos θ_i. The unknown factor of the
-    last two stays in the values, which the attribute ``scale = "arbitrary"`` records. Degree and angle of
-    polarisation are not touched.
+    last two stays in the values, which the attribute ``scale = "arbitrary"`` records. Ratios (degree and angle of
+    polarisation, what is divided by I or m00) are not touched; data of ratios alone keep their quantity.
 
     Parameters
     ----------
@@ -42,11 +42,11 @@ def to_brdf_scale(ds: xr.Dataset) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        A new data set with ``quantity = "brdf"``.
+        A new data set with ``quantity = "brdf"``, or ``"normalised"`` as it was.
     """
     quantity = ds.attrs["quantity"]
     result = ds.copy(deep=True)
-    if quantity == "brdf":
+    if quantity in ("brdf", NORMALISED):
         return result
 
     def scaled(values: NDArray[np.float64]) -> NDArray[np.float64]:

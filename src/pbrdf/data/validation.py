@@ -26,10 +26,14 @@ from pbrdf.data.schema import (
     DIMENSION,
     FILE_KEYS,
     FORMS,
+    NORMALISED,
     QUANTITIES,
+    RATIOS,
     STOKES_AXES,
     TEXT_ATTRIBUTES,
     VARIABLES,
+    is_ratio,
+    only_ratios,
     spells_integer,
     std_name,
     variable_dims,
@@ -43,6 +47,8 @@ __all__ = ["Issue", "check", "validate"]
 TOLERATED_DEVIATIONS = 5.0
 #: Single precision rounds a degree of polarisation of 1 to a little more.
 _ROUNDING = 1e-6
+#: How far m00/m00 may be from 1: rounding.
+_OWN_ELEMENT = 1e-3
 
 _ROWS_NAMED = 5
 _LOWER_CASE_ATTRIBUTES = frozenset(
@@ -274,17 +280,23 @@ def _array(ds: xr.Dataset, name: str) -> Iterator[Issue]:
 
 def _forms(ds: xr.Dataset) -> Iterator[Issue]:
     present = [name for name in VARIABLES if name in ds.data_vars]
-    if not any(core in present and set(present) <= {core, *beside} for core, beside in FORMS):
+    if not any(set(cores) & set(present) and set(present) <= {*cores, *beside} for cores, beside in FORMS):
         yield _error(
             "",
-            f"the variables are {', '.join(present) or 'none'}; give I with any of Q, U, V; or I with dolp "
-            "and perhaps aolp; or mueller alone",
+            f"the variables are {', '.join(present) or 'none'}; give I with any of Q, U, V; or dolp, perhaps with "
+            "aolp, V_over_I and I; or mueller alone; or any of Q_over_I, U_over_I, V_over_I, perhaps with I; or "
+            "mueller_over_m00, perhaps with I",
         )
-    elif "dolp" in present and "I" not in present:
-        yield _error("I", "dolp needs I beside it; fill I with NaN if it was not measured")
     elif COVARIANCE in ds.data_vars and not set(present) <= set(STOKES):
         other = next(name for name in present if name not in STOKES)
         yield _error(COVARIANCE, f"the covariance is that of I, Q, U, V and cannot stand beside {other}")
+    if ds.attrs.get("quantity") == NORMALISED and not only_ratios(present):
+        other = next(name for name in present if not is_ratio(name))
+        yield _error(
+            "quantity",
+            f"the quantity is {NORMALISED!r}, for ratios alone, but there is {other}: state what {other} is, one of "
+            f"{', '.join(name for name in QUANTITIES if name != NORMALISED)}",
+        )
 
 
 def _angles(ds: xr.Dataset, labels: _Labels) -> Iterator[Issue]:
@@ -385,14 +397,24 @@ def _covariance(ds: xr.Dataset, labels: _Labels) -> Iterator[Issue]:
 def _physics(ds: xr.Dataset, labels: _Labels) -> Iterator[Issue]:
     mueller = "mueller" in ds
     name = "mueller" if mueller else "I"
-    intensity = ds["mueller"].values[:, 0, 0] if mueller else ds["I"].values
-    dark = np.flatnonzero(intensity <= 0)
-    if dark.size:
+    intensity = np.full(ds.sizes[DIMENSION], np.nan)
+    if mueller or "I" in ds:
+        intensity = ds["mueller"].values[:, 0, 0] if mueller else ds["I"].values
+        dark = np.flatnonzero(intensity <= 0)
+        if dark.size:
+            yield _warning(
+                name,
+                f"{labels.variable(name)}, {labels.rows(dark)}: {'m00' if mueller else 'I'} = "
+                f"{intensity[dark[0]]:.6g} is not positive",
+                dark,
+            )
+    divided = "the matrices" if mueller else ", ".join(n for n in ("Q", "U", "V") if n in ds)
+    exact = std_name(name) not in ds
+    if divided and exact and len(intensity) > 1 and np.all(intensity == 1.0):
         yield _warning(
             name,
-            f"{labels.variable(name)}, {labels.rows(dark)}: {'m00' if mueller else 'I'} = "
-            f"{intensity[dark[0]]:.6g} is not positive",
-            dark,
+            f"{labels.variable(name)}: {'m00' if mueller else 'I'} is 1 at every geometry, as if {divided} were "
+            f"divided by it: then they are ratios (read the file with the quantity {NORMALISED})",
         )
     if "dolp" in ds:
         degree = ds["dolp"].values
@@ -404,12 +426,23 @@ def _physics(ds: xr.Dataset, labels: _Labels) -> Iterator[Issue]:
                 bad,
             )
         return
+    if "mueller_over_m00" in ds:
+        yield from _own_element(ds, labels)
     # Values of any size may meet here; what overflows or divides by zero compares as not excessive.
     with np.errstate(all="ignore"):
-        ratio, deviation = _largest_element(ds) if mueller else _degree_of_polarization(ds)
-        bad = np.flatnonzero((ratio - TOLERATED_DEVIATIONS * deviation > 1 + _ROUNDING) & (intensity > 0))
+        if "mueller_over_m00" in ds:
+            name, what = "mueller_over_m00", "largest |m_ij|/m00"
+            ratio, deviation = _largest_ratio(ds)
+        elif mueller:
+            what = "largest |m_ij|/m00"
+            ratio, deviation = _largest_element(ds)
+        else:
+            name = next((n for n in RATIOS if n in ds), "I")
+            what = "degree of polarisation"
+            ratio, deviation = _degree_of_polarization(ds)
+        excessive = ratio - TOLERATED_DEVIATIONS * deviation > 1 + _ROUNDING
+        bad = np.flatnonzero(excessive if name in RATIOS else excessive & (intensity > 0))
     if bad.size:
-        what = "largest |m_ij|/m00" if mueller else "degree of polarisation"
         yield _warning(
             name,
             f"{labels.variable(name)}, {labels.rows(bad)}: the {what} = {ratio[bad[0]]:.6g} exceeds 1 by "
@@ -418,15 +451,40 @@ def _physics(ds: xr.Dataset, labels: _Labels) -> Iterator[Issue]:
         )
 
 
+def _own_element(ds: xr.Dataset, labels: _Labels) -> Iterator[Issue]:
+    own = ds["mueller_over_m00"].values[:, 0, 0]
+    bad = np.flatnonzero(np.abs(own - 1.0) > _OWN_ELEMENT)
+    if bad.size:
+        yield _error(
+            "mueller_over_m00",
+            f"{labels.variable('mueller_over_m00')}, {labels.rows(bad)}: the matrices are divided by m00, but their "
+            f"own m00 is {own[bad[0]]:.6g}; put 1 or NaN there, and the intensity into I",
+            bad,
+        )
+
+
 def _degree_of_polarization(ds: xr.Dataset) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """DoP from what was measured, a lower bound if a channel is missing, and its standard uncertainty."""
-    if not {"Q", "U", "V"} & set(map(str, ds.data_vars)):
+    normalised = any(name in ds for name in RATIOS)
+    names = ("Q_over_I", "U_over_I", "V_over_I") if normalised else ("Q", "U", "V")
+    if not any(name in ds for name in names):
         return np.zeros(ds.sizes[DIMENSION]), np.zeros(ds.sizes[DIMENSION])
-    polarized = np.stack([_or_zero(ds, name) for name in ("Q", "U", "V")])
-    deviations = np.stack([_or_zero(ds, std_name(name)) for name in ("Q", "U", "V")])
+    polarized = np.stack([_or_zero(ds, name) for name in names])
+    deviations = np.stack([_or_zero(ds, std_name(name)) for name in names])
     length = np.linalg.norm(polarized, axis=0)
     along = np.linalg.norm(polarized * deviations, axis=0) / length
+    if normalised:
+        return length, np.nan_to_num(along)
     return _ratio(length, along, ds["I"].values, _or_zero(ds, "I_std"))
+
+
+def _largest_ratio(ds: xr.Dataset) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Largest |m_ij|/m00 of matrices that are divided by m00, without m00 itself, and its standard uncertainty."""
+    elements = np.abs(_or_zero(ds, "mueller_over_m00")).reshape(-1, 16)
+    deviations = _or_zero(ds, "mueller_over_m00_std").reshape(-1, 16)
+    rows = np.arange(len(elements))
+    largest = 1 + np.argmax(elements[:, 1:], axis=1)
+    return elements[rows, largest], deviations[rows, largest]
 
 
 def _largest_element(ds: xr.Dataset) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -453,5 +511,4 @@ def _or_zero(ds: xr.Dataset, name: str) -> NDArray[np.float64]:
     """Values of a variable, 0 where it is missing or NaN."""
     if name in ds.data_vars:
         return np.nan_to_num(ds[name].values, nan=0.0)
-    like = ds["mueller"] if name.startswith("mueller") else ds["I"]
-    return np.zeros(like.shape)
+    return np.zeros((ds.sizes[DIMENSION], *(4 for _ in variable_dims(name)[1:])))

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pbrdf.data.schema import is_ratio
 from pbrdf.inversion.observations import Observations
 from pbrdf.inversion.problem import Space, predict
 from pbrdf.models.base import Model
@@ -47,7 +48,7 @@ def compare(
     """
     import xarray as xr
 
-    elements = observations.channels[0].startswith("m")
+    elements = "m00" in observations.channels
     wanted = tuple(dict.fromkeys((*observations.channels, *(("m00", "m10", "m20") if elements else "IQU"))))
     everything = predict(space, unknowns, observations, wanted)
     if elements:
@@ -66,14 +67,20 @@ def compare(
         intensity, q, u = (
             measured.get(a, measured.get(b)) for a, b in (("I", "m00"), ("Q", "m10"), ("U", "m20"))
         )
-        if intensity is not None and q is not None:
+        q_ratio, u_ratio = (
+            measured.get(f"{a}_over_I", measured.get(f"{b}_over_m00"))
+            for a, b in (("Q", "m10"), ("U", "m20"))
+        )
+        if q_ratio is not None:
+            measured["dolp"] = np.hypot(q_ratio, 0.0 if u_ratio is None else u_ratio)
+        elif intensity is not None and q is not None:
             with np.errstate(divide="ignore", invalid="ignore"):
                 measured["dolp"] = np.hypot(q, 0.0 if u is None else u) / intensity
     result = xr.Dataset(
         coords={name: dataset[name] for name in dataset.coords if name not in ("stokes_out", "stokes_in")}
     )
     for name in dict.fromkeys((*observations.channels, "I", "dolp")):
-        unit = "1" if name == "dolp" else "1/sr"
+        unit = "1" if is_ratio(name) else "1/sr"
         columns = {"modelled": everything[name]}
         if name in measured:
             columns |= {"measured": measured[name], "residual": everything[name] - measured[name]}

@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pbrdf.data import conventions
-from pbrdf.data.schema import COVARIANCE
+from pbrdf.data.schema import COVARIANCE, RATIOS
+from pbrdf.inversion.noise import NoiseModel
 from pbrdf.inversion.plausibility import Finding, Severity
 from pbrdf.inversion.result import FitResult
 from pbrdf.inversion.trials import Clock, Suggestion, some_of, trial, trial_arguments
@@ -46,6 +47,9 @@ _Change = Callable[["xr.Dataset"], "xr.Dataset"]
 #: Whether the convention was stated, the option, words after "the data fit better", the change.
 _Reading = tuple[bool, str, str, _Change]
 _RADIOMETRIC = ("I", "Q", "U", "V", "mueller")
+_SIGNED = ("Q", "U", "Q_over_I", "U_over_I")
+_MATRICES = ("mueller", "mueller_over_m00")
+_SHARES = tuple(name for name in RATIOS if name != "aolp")
 
 
 def misfit(result: FitResult, findings: Sequence[Finding]) -> bool:
@@ -95,6 +99,8 @@ def contradicted_conventions(
     for option, words, change in readings(some):
         if not clock.allows():
             break
+        if change is _ratios_in_percent and arguments.get("noise") is not None:
+            continue  # a stated noise would not shrink with the values
         after = trial(change(some), clock, **arguments)
         if after is None:
             continue
@@ -129,18 +135,19 @@ def readings(dataset: xr.Dataset) -> Iterator[tuple[str, str, _Change]]:
         option = "theta_r of the other sign" if "no azimuth" in assumed else "--azimuth forward=180"
         option += " (or forward=0 if that was stated)" if stated else ""
         found.append((stated, option, "with forward at the other end of the azimuth", _azimuth))
-    if any(name in dataset for name in ("Q", "U", "aolp", "mueller")):
+    if any(name in dataset for name in (*_SIGNED, *_MATRICES, "aolp")):
         stated = "Q > 0" not in assumed
         option = "--stokes s-p" + (" (or p-s if that was stated)" if stated else "")
         found.append((stated, option, "with Q and U of the other sign", _stokes))
-    if "Q" in dataset and "U" in dataset:
-        option = "the columns of Q and U exchanged (--column Q=… --column U=…)"
-        found.append((True, option, "with Q and U exchanged", _exchanged("Q", "U")))
-        option = "the sign of U or of phi changed in the file"
-        found.append((True, option, "with the azimuth counted the other way", _mirrored))
-        if COVARIANCE not in dataset:
-            option = "the columns of Q and U as Q/I and U/I"
-            found.append((True, option, "with Q and U taken as Q/I and U/I", _normalised))
+    for q, u in (("Q", "U"), ("Q_over_I", "U_over_I")):
+        if q in dataset and u in dataset:
+            option = f"the columns of {q} and {u} exchanged (--column {q}=… --column {u}=…)"
+            found.append((True, option, f"with {q} and {u} exchanged", _exchanged(q, u)))
+            option = "the sign of U or of phi changed in the file"
+            found.append((True, option, "with the azimuth counted the other way", _mirrored))
+    if "Q" in dataset and "U" in dataset and COVARIANCE not in dataset:
+        option = "the columns of Q and U as Q/I and U/I"
+        found.append((True, option, "with Q and U taken as Q/I and U/I", _normalised))
     theta_i, theta_r = dataset["theta_i"].values, dataset["theta_r"].values
     if max(theta_i.max(), theta_r.max()) < _SMALL:
         found.append((False, "--angles radians", "with angles in radians", _in_radians))
@@ -156,8 +163,10 @@ def readings(dataset: xr.Dataset) -> Iterator[tuple[str, str, _Change]]:
         found.append((True, "--not-cosine-weighted", "multiplied by cos θ_r", _multiplied_by_cosine))
         if dataset.attrs.get("scale") != "arbitrary":
             found += _scales(dataset.attrs.get("quantity"))
-    if "dolp" in dataset and float(np.nanmax(dataset["dolp"].values, initial=0.0)) > 0.0:
-        found.append((True, "DoLP divided by 100", "with DoLP taken as per cent", _dolp_in_percent))
+    ratios = [name for name in _SHARES if name in dataset and np.nan_to_num(dataset[name].values).any()]
+    if ratios:
+        what = "DoLP" if ratios == ["dolp"] else "the ratios"
+        found.append((True, f"{what} divided by 100", f"with {what} taken as per cent", _ratios_in_percent))
     for _, option, words, change in sorted(found, key=lambda item: item[0]):
         yield option, words, change
 
@@ -181,13 +190,14 @@ def _azimuth(dataset: xr.Dataset) -> xr.Dataset:
 
 def _stokes(dataset: xr.Dataset) -> xr.Dataset:
     changed = dataset.copy()
-    for name in ("Q", "U"):
+    for name in _SIGNED:
         if name in changed:
             changed[name] = -changed[name]
     if "aolp" in changed:
         changed["aolp"] = (changed["aolp"].dims, conventions.aolp_swap_sp(changed["aolp"].values))
-    if "mueller" in changed:
-        changed["mueller"] = (changed["mueller"].dims, conventions.mueller_swap_sp(changed["mueller"].values))
+    for name in _MATRICES:
+        if name in changed:
+            changed[name] = (changed[name].dims, conventions.mueller_swap_sp(changed[name].values))
     if COVARIANCE in changed:
         swapped = conventions.covariance_swap_sp(changed[COVARIANCE].values)
         changed[COVARIANCE] = (changed[COVARIANCE].dims, swapped)
@@ -270,9 +280,24 @@ def _elevation(names: Sequence[str]) -> _Change:
     return change
 
 
-def _dolp_in_percent(dataset: xr.Dataset) -> xr.Dataset:
+def _ratios_in_percent(dataset: xr.Dataset) -> xr.Dataset:
+    """Ratios over 100 with their uncertainties, also those that a fit assumes: else weights alone would lower χ²."""
     changed = dataset.copy()
-    for column in ("dolp", "dolp_std"):
-        if column in changed:
-            changed[column] = changed[column] / 100.0
+    nothing = np.full(dataset.sizes["geometry"], np.nan)
+    for name in _SHARES:
+        if name not in changed:
+            continue
+        values = changed[name]
+        intensity = dataset["I"].values if "I" in dataset else nothing
+        assumed = NoiseModel().standard_uncertainty(name, intensity, np.ones(len(nothing)))
+        std = np.broadcast_to(assumed.reshape((-1,) + (1,) * (values.ndim - 1)), values.shape)
+        if f"{name}_std" in changed:
+            stated = changed[f"{name}_std"].values
+            std = np.where(np.isnan(stated), std, stated)
+        changed[f"{name}_std"] = (values.dims, std / 100.0)
+        changed[name] = values / 100.0
+    if "mueller_over_m00" in changed:
+        own = changed["mueller_over_m00"].values.copy()
+        own[:, 0, 0] = dataset["mueller_over_m00"].values[:, 0, 0]  # 1, whatever the others are in
+        changed["mueller_over_m00"] = (changed["mueller_over_m00"].dims, own)
     return changed

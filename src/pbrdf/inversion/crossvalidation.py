@@ -114,8 +114,8 @@ class CrossValidation:
         """What the numbers say, in plain words."""
         worst = max(self.folds, key=lambda f: _badness(f.prediction))
         lines = [
-            f"{len(self.folds)} folds by {self.by}: predictions miss the intensity by {_text(self.prediction)}; the "
-            f"fit to all data by {_text(self.fitted)}.",
+            f"{len(self.folds)} folds by {self.by}: predictions miss {_text(self.prediction)}; the "
+            f"fit to all data misses {_text(self.fitted)}.",
             f"In units of the standard uncertainty predictions miss by {self.score:.3g} (root mean square), the fit "
             f"by {self.fitted_score:.3g}.",
             f"Worst predicted: {worst.label}, {_text(worst.prediction)}.",
@@ -407,16 +407,20 @@ def _parameter_table(full: FitResult, folds: list[Fold], values: np.ndarray) -> 
 
 
 def _badness(prediction: Prediction) -> float:
-    """Error by which folds are ranked: of the intensity, or of the DoLP where only that can be judged."""
-    rms = prediction.intensity_rms
-    return rms if math.isfinite(rms) else prediction.dolp_rms
+    """Error by which folds are ranked: of the intensity, or of DoLP or ratios where only these can be judged."""
+    sizes = (prediction.intensity_rms, prediction.dolp_rms, prediction.ratio_rms)
+    return next((rms for rms in sizes if math.isfinite(rms)), math.nan)
 
 
 def _text(prediction: Prediction) -> str:
-    text = (
-        f"{prediction.intensity_rms:.2%} rms (median {prediction.intensity_median:.2%}, at most "
-        f"{prediction.intensity_max:.2%})"
-    )
+    parts = []
+    if math.isfinite(prediction.intensity_rms):
+        parts.append(
+            f"the intensity by {prediction.intensity_rms:.2%} rms (median {prediction.intensity_median:.2%}, at most "
+            f"{prediction.intensity_max:.2%})"
+        )
     if math.isfinite(prediction.dolp_rms):
-        text += f", the DoLP by {prediction.dolp_rms:.4f} rms"
-    return text
+        parts.append(f"the DoLP by {prediction.dolp_rms:.4f} rms")
+    elif math.isfinite(prediction.ratio_rms):
+        parts.append(f"the ratios by {prediction.ratio_rms:.4f} rms")
+    return ", ".join(parts)

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pbrdf.data.schema import written
 from pbrdf.inversion.optimum import Optimum
 
 if TYPE_CHECKING:
@@ -475,9 +476,9 @@ def _structure_sentences(structure: dict[str, Structure]) -> list[str]:
             "wavelength."
         ]
     return [
-        f"The residuals of {channel} are structured ({s.runs} runs of equal sign where {s.expected_runs:.0f} were to "
-        f"be expected, {s.positive} above 0 and {s.negative} below{_uneven(s)}): the model departs from the "
-        "measurement in a way that noise does not explain."
+        f"The residuals of {written(channel)} are structured ({s.runs} runs of equal sign where "
+        f"{s.expected_runs:.0f} were to be expected, {s.positive} above 0 and {s.negative} below{_uneven(s)}): the "
+        "model departs from the measurement in a way that noise does not explain."
         for channel, s in found.items()
     ]
 

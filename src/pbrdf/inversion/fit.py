@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
@@ -266,4 +267,8 @@ def _noise_in_words(noise: Noise | None, data: Observations) -> str:
     if data.std_known:
         kind = "standard uncertainties" if data.correlation is None else "covariances"
         return f"{kind} of the data set"
-    return f"assumed, as the data set states no (or not every) uncertainty: {NoiseModel()}"
+    assumed = NoiseModel()
+    words = str(assumed)
+    if not {"I", "m00"} & set(data.channels):
+        words = f"{math.hypot(assumed.relative, assumed.absolute):.2g} for every ratio"
+    return f"assumed, as the data set states no (or not every) uncertainty: {words}"

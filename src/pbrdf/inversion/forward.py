@@ -19,6 +19,9 @@ from pbrdf.optics.geometry import geometry_from_angles
 
 __all__ = ["channel_values", "measured_mueller"]
 
+#: What is no larger than this is no light: single precision holds its reciprocal.
+_DARKEST = 1e-30
+
 
 def measured_mueller(
     model: Model,
@@ -79,7 +82,8 @@ def channel_values(
     f
         Mueller matrix over Dr.Jit floats.
     channels
-        ``I``, ``Q``, ``U``, ``V``, ``dolp`` or ``m00`` … ``m33``.
+        ``I``, ``Q``, ``U``, ``V``, ``dolp``, ``Q_over_I`` …, ``m00`` … ``m33`` or ``m01_over_m00`` … A ratio is 0
+        where the model is dark.
     incident
         Stokes vector of the source.
     gain, dark
@@ -91,15 +95,30 @@ def channel_values(
         total = total if gain is None else total * gain
         return total + dark if i == 0 and dark is not None else total
 
+    def element(name: str) -> Any:
+        value = f[int(name[1])][int(name[2])]
+        value = value if gain is None else value * gain
+        return value + dark if name == "m00" and dark is not None else value
+
     values = []
     for name in channels:
-        if name == "dolp":
+        part, over, whole = name.partition("_over_")
+        if over:
+            of = element if whole == "m00" else lambda name: stokes("IQUV".index(name))
+            values.append(_ratio(of(part), of(whole)))
+        elif name == "dolp":
             # the tiny offset keeps the derivative finite where Q = U = 0
             values.append(dr.sqrt(dr.square(stokes(1)) + dr.square(stokes(2)) + 1e-24) / stokes(0))
         elif name.startswith("m"):
-            value = f[int(name[1])][int(name[2])]
-            value = value if gain is None else value * gain
-            values.append(value + dark if name == "m00" and dark is not None else value)
+            values.append(element(name))
         else:
             values.append(stokes("IQUV".index(name)))
     return values
+
+
+def _ratio(part: Any, whole: Any) -> Any:
+    """part / whole with finite derivatives, 0 where the whole is 0."""
+    if is_zero(part):
+        return 0.0
+    lit = dr.abs(whole) > _DARKEST
+    return dr.select(lit, part, 0.0) / dr.select(lit, whole, 1.0)

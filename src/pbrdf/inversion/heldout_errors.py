@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pbrdf.data.schema import is_ratio
 from pbrdf.inversion.holdout import DARK
 
 if TYPE_CHECKING:
@@ -82,7 +83,7 @@ class PointErrors:
                 if name in ("I", "m00"):
                     continue
                 seen, given = column(f"{name}_measured"), column(f"{name}_modelled")
-                if name != "dolp":
+                if not is_ratio(name):
                     seen, given = seen / measured, given / modelled
                 polarised.append(
                     np.where(measured < floor, np.nan, _penalised(given - seen, seen))

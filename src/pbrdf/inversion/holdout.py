@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -124,6 +125,8 @@ class Prediction:
     dolp_rms, dolp_max
         Root mean square and largest size of the error of the degree of linear polarisation, 1; NaN where no
         polarisation was measured.
+    ratio_rms, ratio_max
+        The same of all channels that were measured as ratios, Q/I … or m01/m00 …; NaN where none was.
     """
 
     count: int
@@ -132,6 +135,8 @@ class Prediction:
     intensity_max: float
     dolp_rms: float
     dolp_max: float
+    ratio_rms: float = math.nan
+    ratio_max: float = math.nan
 
 
 def prediction_errors(comparison: xr.Dataset, where: np.ndarray) -> Prediction:
@@ -149,6 +154,10 @@ def prediction_errors(comparison: xr.Dataset, where: np.ndarray) -> Prediction:
         return error[np.isfinite(error)]
 
     intensity, dolp = errors("I", relative=True), errors("dolp", relative=False)
+    measured = [str(name).removesuffix("_measured") for name in comparison if "_over_" in str(name)]
+    ratios = np.concatenate(
+        [np.empty(0), *(errors(name, relative=False) for name in dict.fromkeys(measured))]
+    )
 
     def rms(x: np.ndarray) -> float:
         return float(np.sqrt((x**2).mean())) if x.size else nan
@@ -160,4 +169,6 @@ def prediction_errors(comparison: xr.Dataset, where: np.ndarray) -> Prediction:
         intensity_max=float(np.abs(intensity).max()) if intensity.size else nan,
         dolp_rms=rms(dolp),
         dolp_max=float(np.abs(dolp).max()) if dolp.size else nan,
+        ratio_rms=rms(ratios),
+        ratio_max=float(np.abs(ratios).max()) if ratios.size else nan,
     )

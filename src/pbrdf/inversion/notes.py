@@ -45,6 +45,11 @@ def notes_on(
         notes.append(
             "No polarisation was measured: the parameters and the model's DoLP rest on the intensity alone."
         )
+    if not {"I", "m00"} & set(data.channels):
+        notes.append(
+            "No intensity was measured, only ratios: they set the diffuse part against the specular one, whose height "
+            "the model knows, and every absolute value rests on that."
+        )
     for name, e in result.estimates.items():
         if e.verdict.startswith("at "):
             bound = e.lower if "lower" in e.verdict else e.upper

@@ -10,7 +10,7 @@ import numpy as np
 
 from pbrdf.data.conventions import qu_from_dolp_aolp
 from pbrdf.data.covariance import correlations
-from pbrdf.data.schema import COVARIANCE
+from pbrdf.data.schema import COVARIANCE, NORMALISED, is_ratio
 from pbrdf.data.select import measured_channels, to_brdf_scale
 from pbrdf.errors import FitError
 from pbrdf.inversion.noise import Noise, NoiseModel
@@ -35,7 +35,7 @@ class Observations:
         Angles in radians, shape (G,).
     channels
         What is compared: ``I``, ``Q``, ``U``, ``V`` (radiance per unit irradiance of the stated illumination),
-        ``dolp``, or Mueller elements ``m00`` … ``m33``.
+        ``dolp``, ``Q_over_I`` …, Mueller elements ``m00`` … ``m33``, or those over m00, ``m01_over_m00`` …
     values, std
         Shape (C, G). Not measured: ``values`` 0 and ``std`` infinite.
     illumination
@@ -70,7 +70,9 @@ class Observations:
     ) -> Observations:
         """Take what was measured from a valid data set.
 
-        DoLP with AoLP becomes Q and U (their uncertainties propagated); DoLP alone is compared as it is.
+        DoLP with AoLP becomes Q/I and U/I, which no error of the intensity reaches (their uncertainties and their
+        correlation propagated; where that of AoLP is not stated, both are as uncertain as DoLP). DoLP alone and
+        other ratios are compared as they are.
         Uncertainties and covariances of the data set are used where given unless ``noise`` states others.
 
         Parameters
@@ -94,7 +96,7 @@ class Observations:
         scale = np.ones(ds.sizes["geometry"])
         if quantity == "reflectance_factor":
             scale /= np.pi
-        elif quantity != "brdf":
+        elif quantity not in ("brdf", NORMALISED):
             scale /= np.cos(ds["theta_i"].values)
         ds = to_brdf_scale(ds)
         measured = measured_channels(ds)
@@ -103,25 +105,29 @@ class Observations:
         stated = {name: _std(ds, name) for name in measured}
         columns: dict[str, np.ndarray] = {}
         uncertainties: dict[str, np.ndarray] = {}
-        if "mueller" in measured:
-            for i in range(4):
-                for j in range(4):
-                    name = f"m{i}{j}"
-                    columns[name] = ds["mueller"].values[:, i, j]
-                    uncertainties[name] = stated["mueller"][:, i, j]
-            intensity = columns["m00"]
-        else:
-            columns = {name: ds[name].values for name in measured if name not in ("dolp", "aolp")}
-            uncertainties = {name: stated[name] for name in columns}
-            intensity = columns.get("I", np.ones(ds.sizes["geometry"]))
-            if "dolp" in measured and "aolp" in measured:
-                dolp, aolp = ds["dolp"].values, ds["aolp"].values
-                columns["Q"], columns["U"] = qu_from_dolp_aolp(intensity, dolp, aolp)
-                uncertainties["Q"], uncertainties["U"] = _propagated(
-                    intensity, dolp, aolp, stated["I"], stated["dolp"], stated["aolp"]
-                )
-            elif "dolp" in measured:
-                columns["dolp"], uncertainties["dolp"] = ds["dolp"].values, stated["dolp"]
+        for name in measured:
+            if name.startswith("mueller"):
+                for i, j in np.ndindex(4, 4):
+                    element = name.replace("mueller", f"m{i}{j}")
+                    if element != "m00_over_m00":  # 1 says nothing
+                        columns[element] = ds[name].values[:, i, j]
+                        uncertainties[element] = stated[name][:, i, j]
+            elif name not in ("dolp", "aolp"):
+                columns[name], uncertainties[name] = ds[name].values, stated[name]
+        turned = None
+        if "dolp" in measured and "aolp" in measured:
+            columns["Q_over_I"], columns["U_over_I"] = qu_from_dolp_aolp(
+                1.0, ds["dolp"].values, ds["aolp"].values
+            )
+            uncertainties["Q_over_I"], uncertainties["U_over_I"], turned = _propagated(
+                ds["dolp"].values, ds["aolp"].values, stated["dolp"], stated["aolp"]
+            )
+        if "dolp" in measured:
+            # of light without a measured angle the degree still counts
+            angle = np.isfinite(ds["aolp"].values) if "aolp" in measured else np.zeros(len(scale), dtype=bool)
+            columns["dolp"] = np.where(angle, np.nan, ds["dolp"].values)
+            uncertainties["dolp"] = stated["dolp"]
+        intensity = columns.get("m00", columns.get("I", np.full(ds.sizes["geometry"], np.nan)))
         model = noise or NoiseModel()
         if objective == "paper":
             columns, uncertainties = _intensity_and_dolp(columns)
@@ -149,7 +155,11 @@ class Observations:
             wavelength=ds["wavelength"].values if "wavelength" in ds.coords else None,
             scale=scale,
         )
-        if COVARIANCE not in ds.data_vars or noise is not None or objective == "paper":
+        if noise is not None or objective == "paper":
+            return result
+        if turned is not None:
+            return result._with_turned(turned)
+        if COVARIANCE not in ds.data_vars:
             return result
         index = [STOKES.index(name) for name in channels]
         correlation = correlations(ds[COVARIANCE].values)[:, index][:, :, index]
@@ -159,6 +169,17 @@ class Observations:
             "the covariance of row {} is singular, as if some combination of {} were known exactly: correct it, or "
             "state a noise, which replaces all uncertainties"
         )
+
+    def _with_turned(self, correlation: np.ndarray) -> Observations:
+        """With the correlation of Q/I and U/I, shape (G,), 0 where it is not known."""
+        if not correlation.any():
+            return self
+        q, u = self.channels.index("Q_over_I"), self.channels.index("U_over_I")
+        matrix = np.broadcast_to(
+            np.eye(len(self.channels)), (len(correlation), *[len(self.channels)] * 2)
+        ).copy()
+        matrix[:, q, u] = matrix[:, u, q] = correlation
+        return replace(self, correlation=matrix)
 
     @property
     def weights(self) -> np.ndarray:
@@ -255,7 +276,9 @@ class Observations:
         message = "covariance of geometry {} is not symmetric and positive definite"
         if not proper.all():
             raise FitError(message.format(int(np.argmin(proper))))
-        scale = 1.0 if self.scale is None else self.scale
+        scale = np.ones(diagonal.shape)
+        if self.scale is not None:
+            scale[[not is_ratio(name) for name in self.channels]] = self.scale
         return replace(
             self,
             std=np.where(measured, np.sqrt(diagonal) * scale, np.inf),
@@ -276,10 +299,15 @@ def _intensity_and_dolp(
     """Intensity and DoLP with equal weights in units of their root mean squares."""
     if "m00" in columns:
         columns = {"I": columns["m00"], "Q": columns["m10"], "U": columns["m20"]}
-    if "I" not in columns or ("Q" not in columns and "dolp" not in columns):
+    elif "m10_over_m00" in columns:
+        ratios = {"Q_over_I": columns["m10_over_m00"], "U_over_I": columns["m20_over_m00"]}
+        columns = {name: v for name, v in columns.items() if name == "I"} | ratios
+    if "I" not in columns or not columns.keys() & {"Q", "Q_over_I", "dolp"}:
         raise FitError('objective "paper": intensity and linear polarisation must have been measured')
     dolp = columns.get("dolp")
-    if dolp is None:
+    if dolp is None and "Q_over_I" in columns:
+        dolp = np.hypot(columns["Q_over_I"], columns.get("U_over_I", np.zeros(1)))
+    elif dolp is None:
         with np.errstate(divide="ignore", invalid="ignore"):
             dolp = np.hypot(columns["Q"], columns.get("U", np.zeros(1))) / columns["I"]
         dolp = np.where(columns["I"] > 0.0, dolp, np.nan)
@@ -288,15 +316,19 @@ def _intensity_and_dolp(
 
 
 def _propagated(
-    intensity: np.ndarray,
-    dolp: np.ndarray,
-    aolp: np.ndarray,
-    s_I: np.ndarray,
-    s_dolp: np.ndarray,
-    s_aolp: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Standard uncertainties of Q = I p cos2ψ and U = I p sin2ψ from independent ones of I, p and ψ."""
+    dolp: np.ndarray, aolp: np.ndarray, s_dolp: np.ndarray, s_aolp: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Standard uncertainties of Q/I = p cos2ψ and U/I = p sin2ψ from independent ones of p and ψ; their correlation.
+
+    The degree that the angle's uncertainty is multiplied with is no smaller than its own uncertainty: near p = 0 first
+    order would take Q/I and U/I for known exactly. Where the angle's is not stated the errors are as large in either
+    direction.
+    """
     c, s = np.cos(2.0 * aolp), np.sin(2.0 * aolp)
-    along = (dolp * s_I) ** 2 + (intensity * s_dolp) ** 2
-    across = (2.0 * intensity * dolp * s_aolp) ** 2
-    return np.sqrt(along * c * c + across * s * s), np.sqrt(along * s * s + across * c * c)
+    along = s_dolp**2
+    across = (2.0 * np.maximum(dolp, s_dolp) * s_aolp) ** 2
+    across = np.where(np.isnan(s_aolp), along, across)
+    s_q, s_u = np.sqrt(along * c * c + across * s * s), np.sqrt(along * s * s + across * c * c)
+    with np.errstate(invalid="ignore"):
+        correlation = (along - across) * c * s / (s_q * s_u)
+    return s_q, s_u, np.nan_to_num(correlation)

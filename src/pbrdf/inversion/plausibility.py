@@ -98,6 +98,8 @@ def _energy(result: Optimum, attributes: dict[Any, Any]) -> Finding:
     largest = f"The model reflects at most {reflectance[worst]:.3g} of natural light (at θ_i = {INCIDENCES[worst]}°)"
     gain = any(term.nuisance and term.role == "gain" for term in result.space.terms)
     unknown = _unknown_scale(attributes)
+    if not {"I", "m00"} & set(result.data.channels):
+        unknown = "the data are ratios, which hold no scale; that of the model is that of its facets"
     if unknown and not gain:
         sentence = f"{largest}, which says nothing about energy: {unknown}."
         return Finding("energy", Severity.NOTE, sentence)

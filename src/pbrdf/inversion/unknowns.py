@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from pbrdf.data.schema import is_ratio
 from pbrdf.errors import FitError
 from pbrdf.inversion.nuisance import KINDS, Nuisance, check_prior
 from pbrdf.inversion.observations import Observations
@@ -92,9 +93,10 @@ def _bounds(
         return low, high
     if p.amplitude:
         # an amplitude is on the data's own scale: π times a typical value is its order of magnitude
-        intensity = np.concatenate(
-            [data.values[c] for c, n in enumerate(data.channels) if n in ("I", "m00")] or [np.ones(1)]
-        )
+        measured = [data.values[c] for c, n in enumerate(data.channels) if n in ("I", "m00")]
+        if not measured:  # ratios set an amplitude against the facets, whose scale is absolute
+            return cls.fit_bounds(p, options)
+        intensity = np.concatenate(measured)
         positive = intensity[intensity > 0.0]
         scale = math.pi * float(np.median(positive)) if positive.size else 1.0
         return max(1e-3 * scale, p.domain[0]), min(1e3 * scale, p.domain[1])
@@ -122,6 +124,8 @@ def with_terms(
 
     given_terms = [Nuisance.parse(n) if isinstance(n, str) else n for n in nuisances]
     with_gain = any(n.kind == "gain" for n in given_terms)
+    if with_gain and all(map(is_ratio, data.channels)):
+        raise FitError("nuisance gain: only ratios were measured, which no gain changes; leave it out")
     intensity = [data.values[c] for c, n in enumerate(data.channels) if n in ("I", "m00")]
     positive = np.concatenate(intensity or [np.ones(1)])
     typical = float(np.median(positive[positive > 0.0])) if (positive > 0.0).any() else 1.0

@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from pbrdf.data.schema import is_ratio
 from pbrdf.inversion.erroranalysis import SIGNIFICANCE, sign_test
 from pbrdf.inversion.estimates import Estimate
 from pbrdf.inversion.holdout import DARK
@@ -356,7 +357,7 @@ def _polarisation(result: Optimum) -> tuple[np.ndarray, np.ndarray]:
     light = np.where(measured > dark, measured, np.nan)
     error, signal, present = np.zeros(size), np.zeros(size), np.zeros(size, dtype=bool)
     for channel in channels:
-        by = (1.0, 1.0) if channel == "dolp" else (modelled, light)
+        by = (1.0, 1.0) if is_ratio(channel) else (modelled, light)
         value = table[f"{channel}_measured"].values / by[1]
         wrong = table[f"{channel}_modelled"].values / by[0] - value
         here = np.isfinite(wrong)
@@ -475,6 +476,8 @@ def _reasons(
         yield "Nothing was held out: how the model predicts what it has not seen is not known."
     if not any(s.quantity == "polarisation" for s in whole):
         yield "No polarisation was measured: this is about the intensity alone."
+    if not any(s.quantity == "intensity" for s in whole):
+        yield "No intensity was measured, only ratios: this is about the polarisation alone."
     reduced = result.goodness.reduced_chi2
     if result.std_known and math.isfinite(reduced):
         times = math.sqrt(reduced)

@@ -120,6 +120,7 @@ def plan(
     repeats: int = 1,
     pixels: int = 400,
     angle_error: float = 0.0,
+    normalised: bool = False,
     reference: Protocol | None = None,
     starts: int = 4,
     seed: int = 0,
@@ -160,6 +161,8 @@ def plan(
         Standard deviation of the sample angle, and out of plane of its tilt too, radians: an error of the intensity on
         the lobe, which otherwise would be taken for the most telling place. A fit of such data must know it too (its
         argument ``covariance``).
+    normalised
+        Whether only Q/I, U/I and V/I count, as where the scale of the readings is not known.
     reference
         Protocol to compare with; None is the paper's, 3 × 21.
     starts, seed
@@ -189,7 +192,13 @@ def plan(
     reference = Protocol.in_plane() if reference is None else reference
     stated = parse_noise(noise) if isinstance(noise, str) else noise
     matrices = information(
-        space, guesses, (candidates, reference), stated, pixels=pixels, angle_error=angle_error
+        space,
+        guesses,
+        (candidates, reference),
+        stated,
+        pixels=pixels,
+        angle_error=angle_error,
+        normalised=normalised,
     )
     own, other = matrices[:, : len(candidates)], matrices[:, len(candidates) :]
     goal = Criterion(criterion, interest, _scale(space, guesses, interest, weights or {}))
@@ -234,7 +243,7 @@ def plan(
         candidates=candidates,
         counts=counts,
         shares=ContinuousDesign(*whole, shares.value),
-        noise=_in_words(stated, pixels, angle_error),
+        noise=_in_words(stated, pixels, angle_error) + (", ratios over I alone" if normalised else ""),
         angle_error=angle_error,
     )
 
@@ -247,6 +256,7 @@ def information(
     *,
     pixels: int = 400,
     angle_error: float = 0.0,
+    normalised: bool = False,
 ) -> np.ndarray:
     """Information of one reading at each geometry about the solver's unknowns.
 
@@ -258,7 +268,7 @@ def information(
         Sets of the solver's unknowns, shape (K, P).
     protocols
         With G geometries together.
-    noise, pixels, angle_error
+    noise, pixels, angle_error, normalised
         As for :func:`plan`.
 
     Returns
@@ -300,11 +310,24 @@ def information(
         spread = spread + np.concatenate(parts, axis=1)
     # a statement of relative errors alone would find the far tail of a lobe as telling as its peak
     dark = values[..., 0] <= DARK * values[..., 0].max(axis=-1, keepdims=True)
-    jacobian = np.where(dark[..., None, None], 0.0, jacobian[..., seen, :])
-    spread = np.where(dark[..., None, None], np.eye(4), spread)
-    weighted = np.linalg.solve(spread[..., seen[:, None], seen], jacobian)
+    jacobian, spread = jacobian[..., seen, :], spread[..., seen[:, None], seen]
+    if normalised:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            over = _slopes_of_ratios(values[..., seen])
+            jacobian = over @ jacobian
+            spread = over @ spread @ np.swapaxes(over, -1, -2)
+    jacobian = np.where(dark[..., None, None], 0.0, jacobian)
+    spread = np.where(dark[..., None, None], np.eye(spread.shape[-1]), spread)
+    weighted = np.linalg.solve(spread, jacobian)
     found = np.swapaxes(jacobian, -1, -2) @ weighted
     return 0.5 * (found + np.swapaxes(found, -1, -2))
+
+
+def _slopes_of_ratios(values: np.ndarray) -> np.ndarray:
+    """Derivatives of all components but the first over the first, by the components: (K, G, C) to (K, G, C − 1, C)."""
+    slopes = np.eye(values.shape[-1])[1:] / values[..., :1, None]
+    slopes[..., 0] = -values[..., 1:] / values[..., :1] ** 2
+    return slopes
 
 
 def _stated(noise: Noise, intensity: np.ndarray, cos_i: np.ndarray) -> np.ndarray:

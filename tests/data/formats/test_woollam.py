@@ -7,13 +7,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from pbrdf.data import read
-from pbrdf.data.schema import VARIABLES
 from pbrdf.errors import DataError
 from pbrdf.optics.fresnel import mueller_reflection
-
-pytestmark = pytest.mark.skipif(
-    "mueller_over_m00" not in VARIABLES, reason="normalised Mueller matrices are not in the schema yet"
-)
 
 
 def psi_delta(theta, n, kappa):

@@ -41,6 +41,16 @@ def test_a_turning_sample_gives_cuts_of_constant_bistatic_angle():
     np.testing.assert_allclose(np.rad2deg(theta_i + forward), 60.0)
 
 
+def test_a_viewer_that_follows_the_source_gives_one_cut_over_the_angle_of_incidence():
+    theta_i = np.arange(5.0, 85.0, 5.0)
+    (cut,) = in_plane_cuts(points(theta_i, theta_i))
+    assert (cut.kind, cut.constant, cut.over_incidence) == ("mirror", 0.0, True)
+    np.testing.assert_allclose(cut.x, theta_i)
+    drawn_i, drawn_r, phi = cut.path_angles()
+    np.testing.assert_array_equal(drawn_i, drawn_r)
+    assert not phi.any()
+
+
 def test_a_fixed_viewer_gives_cuts_of_constant_viewing_angle():
     theta_i = np.tile(np.arange(5.0, 60.0, 5.0), 2)
     cuts = in_plane_cuts(points(theta_i, np.repeat([15.0, -30.0], 11)))

@@ -18,6 +18,14 @@ def test_ratios_and_their_uncertainties_are_those_of_many_draws():
     assert set(found) == {"Q/I", "V/I"}  # without U no angle
 
 
+def test_what_was_measured_as_a_ratio_keeps_its_own_uncertainty():
+    one = np.ones(1)
+    values = {"I": 2.0 * one, "Q_over_I": -0.3 * one, "m01_over_m00": 0.4 * one}
+    found = polarised_quantities(values, {"I": 0.5 * one, "Q_over_I": 0.01 * one})
+    assert (found["Q/I"].measured[0], found["Q/I"].std[0]) == (-0.3, 0.01)
+    assert found["m01"].measured[0] == 0.4 and np.isnan(found["m01"].std[0])
+
+
 @pytest.mark.parametrize("degrees", [-30.0, 0.0, 20.0, 90.0, 120.0])
 def test_the_angle_is_that_of_the_electric_field(degrees):
     p, s = np.cos(np.deg2rad(degrees)), np.sin(np.deg2rad(degrees))

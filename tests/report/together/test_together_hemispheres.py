@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import pbrdf
+from pbrdf.errors import DataError
 from pbrdf.report.together.hemispheres import hemispheres_figure, surfaces_figure
 from pbrdf.report.together.source import Source, incidence_of
 
@@ -25,6 +26,15 @@ def test_data_and_model_share_one_scale(hemisphere):
     np.testing.assert_allclose(
         np.sort(measured.collections[0].get_array()), np.sort(hemisphere["I"].values[chosen])
     )
+
+
+@pytest.mark.parametrize("draw", [hemispheres_figure, surfaces_figure])
+def test_elements_alone_are_neither_intensity_nor_dolp(draw):
+    M = np.full((3, 4, 4), np.nan)
+    M[:, 2, 2] = 0.5
+    dataset = pbrdf.make_dataset([0.1, 0.2, 0.3], 0.2, 0.5, mueller_over_m00=M)
+    with pytest.raises(DataError, match="--kind curves or mueller"):
+        draw([Source("data", dataset=dataset)])
 
 
 def test_the_map_of_a_model_is_the_model():

@@ -13,12 +13,20 @@ from pbrdf.inversion.problem import predict
 from pbrdf.report.comparison.subject import Compared
 from pbrdf.report.dataset.cuts import Cut, in_plane_cuts
 from pbrdf.report.dataset.describe import short_name
-from pbrdf.report.dataset.panels import PANEL_SIZE, VIEWING_ANGLE, channel_label, scale_intensity
+from pbrdf.report.dataset.panels import (
+    PANEL_SIZE,
+    VIEWING_ANGLE,
+    channel_label,
+    scale_intensity,
+    scale_signed,
+)
 from pbrdf.report.dataset.points import Points
+from pbrdf.report.dataset.quantities import channels_behind, polarised_quantities, quantity_of
 from pbrdf.report.dataset.shown_cuts import ShownCuts
 from pbrdf.report.style import BLUE, GREY, looks_of, new_figure, panels, styled
 
 if TYPE_CHECKING:
+    import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -58,7 +66,7 @@ def curves_figure(report: Compared) -> Figure:
             for row, name in enumerate(names):
                 _agreement(axes[row, 0], report, points, name)
             return figure
-        curves = [_along(c, comparison.dataset, cuts) for c in comparison.ranking]
+        curves = [_along(c, comparison.dataset, cuts, names) for c in comparison.ranking]
         for column, cut in enumerate(cuts):
             held = comparison.held_out[cut.rows]
             for row, name in enumerate(names):
@@ -67,7 +75,7 @@ def curves_figure(report: Compared) -> Figure:
                 _models(ax, cut, [c[name][column] for c in curves])
                 _limits(ax, points.channels[name].measured[cut.rows], name)
                 ax.set_ylabel(channel_label(name, points) if column == 0 else "")
-                ax.set_xlabel("angle of incidence θi (°)" if cut.kind == "theta_r" else VIEWING_ANGLE)
+                ax.set_xlabel("angle of incidence θi (°)" if cut.over_incidence else VIEWING_ANGLE)
             alone = comparison.held_out.sum() < comparison.held_out.size and held.all()
             label = ShownCuts(cuts, looks_of(len(cuts)), len(cuts)).label(cut)
             axes[0, column].set_title(label + (" (held out)" if alone else ""))
@@ -116,8 +124,10 @@ def _chosen(cuts: list[Cut], held_out: np.ndarray) -> list[Cut]:
     return [cuts[i] for i in sorted({*held, *(others[j] for j in even)})]
 
 
-def _along(contender: Contender, dataset: Any, cuts: list[Cut]) -> dict[str, list[np.ndarray]]:
-    """Intensity and DoLP of a model along each cut, its nuisance terms included."""
+def _along(
+    contender: Contender, dataset: Any, cuts: list[Cut], names: list[str]
+) -> dict[str, list[np.ndarray]]:
+    """Quantities of a model along each cut, its nuisance terms included."""
     theta_i, theta_r, phi = (
         np.concatenate(a) for a in zip(*(cut.path_angles() for cut in cuts), strict=True)
     )
@@ -137,12 +147,13 @@ def _along(contender: Contender, dataset: Any, cuts: list[Cut]) -> dict[str, lis
         group=dataset["group"].values[rows],
         wavelength=dataset["wavelength"].values[rows] if "wavelength" in dataset.coords else None,
     )
-    values = predict(contender.result.space, contender.result.unknowns, along, ("I", "dolp"))
+    channels = tuple(dict.fromkeys(channel for name in names for channel in channels_behind(name)))
+    values = predict(contender.result.space, contender.result.unknowns, along, channels)
     ends = np.cumsum([cut.path_x.size for cut in cuts])[:-1]
     curves = {}
-    for name, channel in (("intensity", "I"), ("dolp", "dolp")):
+    for name in names:
         whole = np.full(theta_i.size, np.nan)
-        whole[there] = values[channel]
+        whole[there] = quantity_of(name, values)
         curves[name] = np.split(whole, ends)
     return curves
 
@@ -192,7 +203,10 @@ def _limits(ax: Axes, measured: np.ndarray, name: str) -> None:
             )
             ax.set_ylim(bottom, (2.0 if logarithmic else 1.3) * float(positive.max()))
         return
-    ax.set_ylim(0.0, min(1.05, max(1.5 * float(finite.max()), 0.02)))
+    if name == "dolp":
+        ax.set_ylim(0.0, min(1.05, max(1.5 * float(finite.max()), 0.02)))
+    else:
+        scale_signed(ax, name)
 
 
 def _agreement(ax: Axes, report: Compared, points: Points, name: str) -> None:
@@ -201,9 +215,8 @@ def _agreement(ax: Axes, report: Compared, points: Points, name: str) -> None:
     held = comparison.held_out
     measured = points.channels[name].measured[held]
     colours = [look.colour for look in looks_of(_IN_COLOUR)]
-    column = "I_modelled" if name == "intensity" else "dolp_modelled"
     for place in reversed(range(min(_IN_COLOUR, len(comparison.ranking)))):
-        modelled = comparison.ranking[place].comparison[column].values[held]
+        modelled = _modelled(comparison.ranking[place].comparison, name)[held]
         ax.plot(
             measured, modelled, ".", color=colours[place], markersize=4.0, alpha=0.7, zorder=3.0 - 0.1 * place
         )
@@ -215,6 +228,16 @@ def _agreement(ax: Axes, report: Compared, points: Points, name: str) -> None:
     label = channel_label(name, points)
     ax.set_xlabel(f"measured {label}")
     ax.set_ylabel(f"predicted {label}")
+
+
+def _modelled(table: xr.Dataset, name: str) -> np.ndarray:
+    """A quantity of the model at the measured geometries."""
+    if name in ("intensity", "dolp"):
+        return table["I_modelled" if name == "intensity" else "dolp_modelled"].values
+    columns = [str(n) for n in table if str(n).endswith("_modelled")]
+    return polarised_quantities({n.removesuffix("_modelled"): table[n].values for n in columns})[
+        name
+    ].measured
 
 
 def _handles(ranking: list[Contender], with_cuts: bool) -> list[Any]:

@@ -2,8 +2,9 @@
 
 In the plane of incidence a geometry is two numbers, θ_i and the signed viewing angle s = ±θ_r (negative on
 the source's side). Goniometers move along simple lines in that plane: a fixed source (θ_i constant), a fixed
-viewer (s constant), or a turning sample between a fixed source and a fixed viewer (θ_i + s, the bistatic
-angle, constant). Whichever of these explains the points with the fewest lines is taken.
+viewer (s constant), a turning sample between a fixed source and a fixed viewer (θ_i + s, the bistatic
+angle, constant), or a viewer that follows the source (s − θ_i constant, 0 in the mirror direction). Whichever
+of these explains the points with the fewest lines is taken.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from pbrdf.report.dataset.points import Points
 
 __all__ = ["KINDS", "Cut", "in_plane", "in_plane_cuts"]
 
-KINDS = ("theta_i", "bistatic", "theta_r")
+KINDS = ("theta_i", "bistatic", "theta_r", "mirror")
 #: How far the azimuth may be off the plane of incidence, degrees.
 _AZIMUTH_TOLERANCE = 1.0
 #: Angles nearer than this belong to the same cut, degrees.
@@ -36,7 +37,7 @@ class Cut:
     Attributes
     ----------
     kind
-        What is constant: ``"theta_i"``, ``"bistatic"`` or ``"theta_r"``.
+        What is constant: ``"theta_i"``, ``"bistatic"``, ``"theta_r"`` or ``"mirror"``.
     constant
         Its value in degrees.
     group
@@ -44,7 +45,7 @@ class Cut:
     rows
         Indices of the points, in the order of ``x``.
     x
-        θ_i if the viewer is fixed, else s, of the points, degrees.
+        θ_i if the viewer is fixed or follows the source, else s, of the points, degrees.
     path_x
         The same along the drawn curve; NaN between parts that are not joined.
     """
@@ -56,12 +57,19 @@ class Cut:
     x: np.ndarray
     path_x: np.ndarray
 
+    @property
+    def over_incidence(self) -> bool:
+        """Whether ``x`` is the angle of incidence."""
+        return self.kind in ("theta_r", "mirror")
+
     def path_angles(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """θ_i, θ_r and φ in radians along the drawn curve; NaN as in ``path_x``."""
         if self.kind == "theta_i":
             theta_i, s = np.full_like(self.path_x, self.constant), self.path_x
         elif self.kind == "theta_r":
             theta_i, s = self.path_x, np.full_like(self.path_x, self.constant)
+        elif self.kind == "mirror":
+            theta_i, s = self.path_x, self.path_x + self.constant
         else:
             theta_i, s = np.maximum(self.constant - self.path_x, 0.0), self.path_x
         return np.deg2rad(theta_i), np.deg2rad(np.abs(s)), np.where(s < 0.0, np.pi, 0.0)
@@ -83,9 +91,10 @@ def in_plane_cuts(points: Points) -> list[Cut]:
         return []
     s = np.where(np.abs(points.phi) > 90.0, -points.theta_r, points.theta_r)
     constants = {"theta_i": points.theta_i, "bistatic": points.theta_i + s, "theta_r": s}
+    constants["mirror"] = s - points.theta_i
     choices = {kind: _split(points.group, constants[kind], rows) for kind in KINDS}
     kind = min(choices, key=lambda k: len(choices[k]))
-    x = points.theta_i if kind == "theta_r" else s
+    x = points.theta_i if kind in ("theta_r", "mirror") else s
     cuts, directions = [], 0
     for members in choices[kind]:
         members = members[np.argsort(x[members], kind="stable")]

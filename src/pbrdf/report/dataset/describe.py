@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pbrdf.data.covariance import correlations
-from pbrdf.data.schema import COVARIANCE, NATURAL_LIGHT
+from pbrdf.data.schema import COVARIANCE, NATURAL_LIGHT, NORMALISED, only_ratios, written
 from pbrdf.data.select import measured_channels
 
 if TYPE_CHECKING:
@@ -21,6 +21,7 @@ _QUANTITIES = {
     "reflectance_factor": "reflectance factor, 1",
     "radiance": "radiance, arbitrary units",
     "dn": "digital numbers of a camera",
+    NORMALISED: "ratios, 1",
 }
 
 
@@ -40,9 +41,10 @@ def describe(ds: xr.Dataset) -> list[str]:
         span = f"{low:.4g}°" if high - low < 1e-6 else f"{low:.4g}° … {high:.4g}°"
         lines.append(f"{words} {name}: {span}")
     kind = "simulated" if ds.attrs.get("simulated") else "measured"
+    quantity = NORMALISED if only_ratios(channels) else ds.attrs["quantity"]
     lines.append(
-        f"{kind} {', '.join(channels)} ({_QUANTITIES[ds.attrs['quantity']]}), {illumination_in_words(ds)}; "
-        f"standard uncertainties of {', '.join(uncertain) if uncertain else 'nothing'}"
+        f"{kind} {', '.join(map(written, channels))} ({_QUANTITIES[quantity]}), {illumination_in_words(ds)}; "
+        f"standard uncertainties of {', '.join(map(written, uncertain)) if uncertain else 'nothing'}"
         f"{_covariances_in_words(ds)}"
     )
     return lines
@@ -64,8 +66,8 @@ def cautions(ds: xr.Dataset) -> list[str]:
 
 def illumination_in_words(ds: xr.Dataset) -> str:
     """``natural light``, or the Stokes vector of the source."""
-    if "mueller" in ds.data_vars:
-        return "full Mueller matrices"
+    if "mueller" in ds.data_vars or ("mueller_over_m00" in ds.data_vars and "I" not in ds.data_vars):
+        return "full Mueller matrices" if "mueller" in ds.data_vars else "normalised Mueller matrices"
     vector = tuple(float(x) for x in ds.attrs["illumination"])
     if vector == NATURAL_LIGHT:
         return "natural light"

@@ -95,4 +95,4 @@ def _colour_norm(name: str, values: np.ndarray) -> Any:
         and math.log10(positive.max() / positive.min()) > LOGARITHMIC_FROM
     ):
         return LogNorm(positive.min(), positive.max())
-    return Normalize(0.0, float(values.max(initial=1e-6)))
+    return Normalize(min(0.0, float(values.min(initial=0.0))), float(values.max(initial=1e-6)))

@@ -97,7 +97,7 @@ def cut_panel(
 
 def cut_axis_label(shown: ShownCuts) -> str:
     """Name of the angle along the cuts, for an axis."""
-    return _INCIDENCE if shown.cuts[0].kind == "theta_r" else VIEWING_ANGLE
+    return _INCIDENCE if shown.cuts[0].over_incidence else VIEWING_ANGLE
 
 
 def dress_hemisphere(ax: Any) -> None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pbrdf.data.conventions import qu_from_dolp_aolp
 from pbrdf.data.covariance import correlations
 from pbrdf.data.schema import COVARIANCE
 from pbrdf.data.select import to_brdf_scale
@@ -16,7 +17,7 @@ from pbrdf.report.dataset.quantities import Channel, polarised_quantities
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Points", "dolp_uncertainty", "error_correlation"]
+__all__ = ["Points", "dolp_uncertainty", "error_correlation", "ratio_dolp", "ratios_of"]
 
 
 @dataclass(frozen=True)
@@ -30,8 +31,8 @@ class Points:
     group
         Labels as text, shape (G,).
     intensity, dolp
-        Intensity on the scale of a BRDF and degree of linear polarisation; ``dolp`` is None if it was not
-        measured.
+        Intensity on the scale of a BRDF, NaN where only ratios were measured, and degree of linear polarisation;
+        ``dolp`` is None if it was not measured.
     arbitrary_scale
         Whether the intensity has an unknown constant factor.
     polarised
@@ -49,8 +50,11 @@ class Points:
 
     @property
     def channels(self) -> dict[str, Channel]:
-        """What was measured, by name: ``"intensity"`` and, if it was measured, ``"dolp"``."""
-        return {"intensity": self.intensity} | ({} if self.dolp is None else {"dolp": self.dolp})
+        """What was measured, by name: ``"intensity"`` and ``"dolp"``; where neither was, all of :attr:`polarised`."""
+        found = {} if self.dolp is None else {"dolp": self.dolp}
+        if np.isfinite(self.intensity.measured).any() or not (found or self.polarised):
+            found = {"intensity": self.intensity} | found
+        return found or dict(self.polarised)
 
     def channel(self, name: str) -> Channel:
         """One of :attr:`channels` or :attr:`polarised`."""
@@ -74,9 +78,12 @@ class Points:
             stokes = [column(name) for name in "IQU"]
             std = [column(f"{name}_std") for name in "IQU"]
             entries = {name: (column(name), column(f"{name}_std")) for name in "IQUV"}
+        entries |= ratios_of(ds)
         dolp = None
         if "dolp" in ds:
             dolp = Channel(column("dolp"), column("dolp_std"))
+        elif (ratio := ratio_dolp(entries)) is not None:
+            dolp = ratio
         elif np.isfinite(stokes[1]).any():
             with np.errstate(divide="ignore", invalid="ignore"):
                 value = np.hypot(stokes[1], np.nan_to_num(stokes[2])) / stokes[0]
@@ -95,6 +102,41 @@ class Points:
                 {name: spread for name, (_, spread) in entries.items()},
             ),
         )
+
+
+def ratios_of(ds: xr.Dataset) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Ratios of a data set and their uncertainties by channel, ``Q_over_I`` … or ``m01_over_m00`` …
+
+    Of DoLP and AoLP the uncertainties of Q/I and U/I are not known here.
+    """
+    found = {}
+    for name in ("Q_over_I", "U_over_I", "V_over_I"):
+        if name in ds:
+            nothing = np.full(ds[name].shape, np.nan)
+            found[name] = (ds[name].values, ds[f"{name}_std"].values if f"{name}_std" in ds else nothing)
+    if "mueller_over_m00" in ds:
+        M = ds["mueller_over_m00"].values
+        known = "mueller_over_m00_std" in ds
+        S = ds["mueller_over_m00_std"].values if known else np.full(M.shape, np.nan)
+        for i, j in np.ndindex(4, 4):
+            if i or j:
+                found[f"m{i}{j}_over_m00"] = (M[:, i, j], S[:, i, j])
+    if "dolp" in ds and "aolp" in ds:
+        nothing = np.full(ds["dolp"].shape, np.nan)
+        q, u = qu_from_dolp_aolp(1.0, ds["dolp"].values, ds["aolp"].values)
+        found |= {"Q_over_I": (q, nothing), "U_over_I": (u, nothing)}
+    return found
+
+
+def ratio_dolp(entries: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> Channel | None:
+    """Degree of linear polarisation of ratios under natural light by channel; None where Q/I is not among them."""
+    for q, u in (("Q_over_I", "U_over_I"), ("m10_over_m00", "m20_over_m00")):
+        if q in entries and np.isfinite(entries[q][0]).any():
+            one, nothing = np.ones(entries[q][0].shape), np.full(entries[q][0].shape, np.nan)
+            (Q, s_Q), (U, s_U) = entries[q], entries.get(u, (nothing, nothing))
+            std = dolp_uncertainty(one, Q, U, 0.0 * one, s_Q, s_U)
+            return Channel(np.hypot(Q, np.nan_to_num(U)), std)
+    return None
 
 
 def error_correlation(ds: xr.Dataset) -> np.ndarray | None:

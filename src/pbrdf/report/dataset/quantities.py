@@ -12,7 +12,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-__all__ = ["Channel", "is_element", "is_intensity", "polarised_quantities", "quantity_label"]
+__all__ = [
+    "Channel",
+    "channels_behind",
+    "is_element",
+    "is_intensity",
+    "polarised_quantities",
+    "quantity_label",
+    "quantity_of",
+]
 
 #: Standard uncertainties that the polarised light must exceed for its angle to be drawn.
 _DETECTED = 2.0
@@ -42,8 +50,8 @@ def polarised_quantities(
     Parameters
     ----------
     values
-        Some of ``I``, ``Q``, ``U``, ``V``, or Mueller elements ``m00`` …, shape (G,) each; what is NaN throughout
-        counts as absent.
+        Some of ``I``, ``Q``, ``U``, ``V``, or Mueller elements ``m00`` …, or what was measured as a ratio,
+        ``Q_over_I`` … or ``m01_over_m00`` …, shape (G,) each; what is NaN throughout counts as absent.
     std
         Their standard uncertainties; None, or absent ones, for unknown.
 
@@ -56,6 +64,10 @@ def polarised_quantities(
     present = {name: v for name, v in values.items() if np.isfinite(v).any()}
     elements = [name for name in sorted(present) if is_element(name)]
     found: dict[str, Channel] = {}
+    ratios = {name.partition("_over_")[::2]: name for name in present if "_over_" in name}
+    for (part, whole), name in sorted(ratios.items()):
+        nothing = np.full(present[name].shape, np.nan)
+        found[part if whole == "m00" else f"{part}/I"] = Channel(present[name], std.get(name, nothing))
     if elements:
         nothing = np.full(present[elements[0]].shape, np.nan)
         for name in elements:
@@ -70,6 +82,24 @@ def polarised_quantities(
     if "Q/I" in found and "U/I" in found:
         found["aolp"] = _angle(found["Q/I"], found["U/I"])
     return found
+
+
+def channels_behind(name: str) -> tuple[str, ...]:
+    """Channels of a fit of which a quantity is made, ``"intensity"`` and ``"dolp"`` included."""
+    if name in ("intensity", "dolp"):
+        return ("I" if name == "intensity" else name,)
+    if name == "aolp":
+        return ("I", "Q", "U")
+    return ("m00", name) if is_element(name) else ("I", name[0])
+
+
+def quantity_of(name: str, values: Mapping[str, np.ndarray]) -> np.ndarray:
+    """A quantity from the values of :func:`channels_behind`."""
+    needed = channels_behind(name)
+    if name in ("intensity", "dolp"):
+        return values[needed[0]]
+    made = polarised_quantities({channel: values[channel] for channel in needed})
+    return made[name].measured if name in made else np.full(values[needed[0]].shape, np.nan)
 
 
 def quantity_label(name: str) -> str:

@@ -44,7 +44,8 @@ class ShownCuts:
         if cut.kind == "bistatic":
             return f"group {cut.group}: θi + θr = {brief(cut.constant)}°"
         # The source of a goniometer may stand at 0.001°.
-        angle = f"{'θi' if cut.kind == 'theta_i' else 'θr'} = {round(cut.constant, 1):g}°"
+        left = {"theta_i": "θi", "theta_r": "θr", "mirror": "θr − θi"}[cut.kind]
+        angle = f"{left} = {round(cut.constant, 1) + 0.0:g}°"
         # Readers of hemispherical data call a group by its angle of incidence: once is enough.
         if len({c.group for c in self.cuts}) == 1 or cut.group == f"{cut.constant:.0f}":
             return angle

@@ -10,7 +10,7 @@ import numpy as np
 from pbrdf.inversion.observations import Observations
 from pbrdf.inversion.problem import predict
 from pbrdf.report.dataset.cuts import Cut
-from pbrdf.report.dataset.quantities import is_element, polarised_quantities
+from pbrdf.report.dataset.quantities import channels_behind, quantity_of
 from pbrdf.report.dataset.shown_cuts import ShownCuts
 from pbrdf.report.fit.fitted_points import FittedPoints
 from pbrdf.report.style import GREY, Look, looks_of
@@ -67,28 +67,15 @@ def model_curves(report: Report, cuts: list[Cut], names: Sequence[str]) -> dict[
         wavelength=ds["wavelength"].values[rows] if "wavelength" in ds.coords else None,
         scale=1.0 / np.cos(theta_i[there]) if ds.attrs["quantity"] in ("radiance", "dn") else None,
     )
-    wanted = {name: _needed(name) for name in names}
-    columns = tuple(dict.fromkeys(column for needed in wanted.values() for column in needed))
+    columns = tuple(dict.fromkeys(column for name in names for column in channels_behind(name)))
     values = predict(report.result.space, report.result.unknowns, along, columns)
     ends = np.cumsum([cut.path_x.size for cut in cuts])[:-1]
     curves = {}
-    for name, needed in wanted.items():
+    for name in names:
         whole = np.full(theta_i.size, np.nan)
-        if name in ("intensity", "dolp"):
-            whole[there] = values[needed[0]]
-        else:
-            whole[there] = polarised_quantities({column: values[column] for column in needed})[name].measured
+        whole[there] = quantity_of(name, values)
         curves[name] = np.split(whole, ends)
     return curves
-
-
-def _needed(name: str) -> tuple[str, ...]:
-    """Channels of a fit that a quantity is made of."""
-    if name in ("intensity", "dolp"):
-        return ("I" if name == "intensity" else name,)
-    if name == "aolp":
-        return ("I", "Q", "U")
-    return ("m00", name) if is_element(name) else ("I", name[0])
 
 
 def legend_handles(points: FittedPoints, shown: ShownCuts, looks: dict[str, Look]) -> list[Any]:
@@ -134,7 +121,7 @@ def legend_handles(points: FittedPoints, shown: ShownCuts, looks: dict[str, Look
             )
         )
     if cuts:
-        bars = np.isfinite(points.measured.intensity.std).any()
+        bars = any(np.isfinite(channel.std).any() for channel in points.measured.channels.values())
         handles.append(
             Line2D([], [], label="measured ± standard uncertainty" if bars else "measured", **mark)
         )

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pbrdf.report.dataset.points import Points, dolp_uncertainty, error_correlation
+from pbrdf.report.dataset.points import Points, dolp_uncertainty, error_correlation, ratio_dolp
 from pbrdf.report.dataset.quantities import Channel, polarised_quantities
 
 if TYPE_CHECKING:
@@ -56,7 +56,11 @@ class FittedPoints:
         dolp = None
         if bare.dolp is not None:
             std = column("dolp_std")
-            if "dolp_std" not in comparison and "I_std" in comparison:
+            ratios = ("Q_over_I", "U_over_I", "m10_over_m00", "m20_over_m00")
+            entries = {n: (column(f"{n}_measured"), column(f"{n}_std")) for n in ratios}
+            if "dolp_std" not in comparison and (ratio := ratio_dolp(entries)) is not None:
+                std = ratio.std
+            elif "dolp_std" not in comparison and "I_std" in comparison:
                 q, u = ("Q", "U") if "Q_std" in comparison else ("m10", "m20")
                 std = dolp_uncertainty(
                     *(column(f"{name}_measured") for name in ("I", q, u)),
@@ -65,7 +69,9 @@ class FittedPoints:
                     if report.result.data.correlation is None
                     else error_correlation(report.dataset),
                 )
-            dolp = Channel(column("dolp_measured"), std)
+            # where the angle was measured too, the fit has Q/I and U/I for it
+            compared = column("dolp_measured")
+            dolp = Channel(np.where(np.isnan(compared), bare.dolp.measured, compared), std)
         names = [str(n).removesuffix("_measured") for n in comparison if str(n).endswith("_measured")]
         polarised = polarised_quantities(
             {name: column(f"{name}_measured") for name in names},

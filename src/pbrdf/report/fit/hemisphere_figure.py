@@ -9,6 +9,7 @@ import numpy as np
 from pbrdf.report.dataset.cuts import in_plane
 from pbrdf.report.dataset.describe import short_name
 from pbrdf.report.dataset.panels import dress_hemisphere
+from pbrdf.report.dataset.quantities import quantity_label
 from pbrdf.report.fit.fitted_points import FittedPoints
 from pbrdf.report.style import new_figure, styled
 
@@ -89,11 +90,9 @@ def hemisphere_figure(report: Report) -> Figure | None:
                 if ax in axes[0]:
                     apart = " (held out)" if points.held_out[measured.group == group].all() else ""
                     ax.set_title(f"group {group}{apart}", fontsize=9.5)
-            label = (
-                "intensity: (model − measured)/measured (%)"
-                if name == "intensity"
-                else "DoLP: model − measured"
-            )
+            label = f"{'DoLP' if name == 'dolp' else quantity_label(name)}: model − measured"
+            if name == "intensity":
+                label = "intensity: (model − measured)/measured (%)"
             figure.colorbar(drawn, ax=list(row), label=label, shrink=0.8, aspect=14.0, extend="both")
         figure.suptitle(title, fontsize=11.0)
         return figure

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pbrdf.data.schema import written
 from pbrdf.inversion.erroranalysis import ErrorStatistics, error_analysis
 from pbrdf.inversion.holdout import Prediction
 from pbrdf.inversion.verdict import Level, Verdict
@@ -213,13 +214,19 @@ def _predicted(report: Report) -> Iterator[Markup]:
 
 
 def _error_table(caption: str, by_region: Mapping[str, Prediction]) -> Markup:
+    intensity = any(math.isfinite(p.intensity_rms) for p in by_region.values())
     polarised = any(math.isfinite(p.dolp_rms) for p in by_region.values())
-    headings = ["region", "geometries", "intensity: median", "rms", "largest"]
+    ratios = any(math.isfinite(p.ratio_rms) for p in by_region.values())
+    headings = ["region", "geometries", *(["intensity: median", "rms", "largest"] if intensity else [])]
     headings += ["DoLP: rms", "largest"] if polarised else []
+    headings += ["ratios: rms", "largest"] if ratios else []
     rows = []
     for region, p in by_region.items():
-        row = [region, str(p.count), *map(per_cent, (p.intensity_median, p.intensity_rms, p.intensity_max))]
-        rows.append(row + ([brief(p.dolp_rms, 2), brief(p.dolp_max, 2)] if polarised else []))
+        row = [region, str(p.count)]
+        if intensity:
+            row += map(per_cent, (p.intensity_median, p.intensity_rms, p.intensity_max))
+        row += [brief(p.dolp_rms, 2), brief(p.dolp_max, 2)] if polarised else []
+        rows.append(row + ([brief(p.ratio_rms, 2), brief(p.ratio_max, 2)] if ratios else []))
     return table(caption, headings, rows, numeric=range(1, len(headings)))
 
 
@@ -230,22 +237,26 @@ def _fails(report: Report) -> Iterator[Markup]:
     # those on single groups stand in the table
     yield bullets(s for s in analysis.sentences() if not s.startswith("Group "))
     polarised = analysis.dolp.count > 0
-    if len(analysis.groups) > 1:
-        headings = ["group", "intensity: mean", "standard deviation", "largest", "at"]
+    intensity = analysis.relative.count > 0
+    if len(analysis.groups) > 1 and (intensity or polarised):
+        headings = ["group"]
+        headings += ["intensity: mean", "standard deviation", "largest", "at"] if intensity else []
         headings += ["DoLP: mean", "largest", "at"] if polarised else []
         rows, classes = [], []
         for g in analysis.groups:
-            cells = [g.group + (" (held out)" if g.held_out else ""), *_statistics(g.relative, per_cent)]
+            cells = [g.group + (" (held out)" if g.held_out else "")]
+            cells += _statistics(g.relative, per_cent) if intensity else []
             if polarised:
                 mean, _, largest, where = _statistics(g.dolp, lambda v: brief(v, 2))
                 cells += [mean, largest, where]
             rows.append(cells)
             classes.append("held" if g.held_out else "")
         yield table(
-            "Errors, model − measured, by group; of the intensity relative to the measured one.",
+            "Errors, model − measured, by group"
+            + ("; of the intensity relative to the measured one." if intensity else "."),
             headings,
             rows,
-            numeric=[1, 2, 3, 5, 6],
+            numeric=[i for i, heading in enumerate(headings) if heading not in ("group", "at")],
             classes=classes,
         )
     yield subheading("The geometries that it misses most")
@@ -283,7 +294,7 @@ def _worst_table(report: Report) -> Markup:
                 str(comparison["group"].values[at]),
                 *angles,
                 *wavelength,
-                channel,
+                written(channel),
                 brief(measured, 3),
                 brief(modelled, 3),
                 brief(float(size[at]), 3),

@@ -14,7 +14,7 @@ from pbrdf.report.dataset.panels import (
     remark,
     scale_intensity,
 )
-from pbrdf.report.dataset.quantities import is_intensity
+from pbrdf.report.dataset.quantities import is_intensity, quantity_label
 from pbrdf.report.dataset.shown_cuts import ShownCuts
 from pbrdf.report.fit.fitted_points import FittedPoints
 from pbrdf.report.numbers import brief
@@ -97,7 +97,8 @@ def difference_panel(ax: Axes, points: FittedPoints, shown: ShownCuts, name: str
     rows = np.concatenate([cut.rows for cut in shown.cuts])
     _limit_differences(ax, differences[rows], " %" if name == "intensity" else "")
     ax.set_xlabel(cut_axis_label(shown))
-    ax.set_ylabel("relative difference of intensity (%)" if name == "intensity" else "difference of DoLP")
+    what = "DoLP" if name == "dolp" else quantity_label(name)
+    ax.set_ylabel("relative difference of intensity (%)" if name == "intensity" else f"difference of {what}")
 
 
 def agreement_panel(ax: Axes, points: FittedPoints, looks: dict[str, Look], name: str) -> None:

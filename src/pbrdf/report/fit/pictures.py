@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -9,6 +10,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from pbrdf.inversion.holdout import Prediction
     from pbrdf.report.fit.subject import Report
 
 __all__ = ["Picture", "pictures"]
@@ -47,22 +49,21 @@ def pictures(report: Report) -> Iterator[Picture]:
     result = report.result
     what = f"{result.model.name} and {result.comparison.sizes['geometry']} measured geometries"
     errors = result.predicted or result.fitted
-    found = (
-        f"median error of the intensity {_median(errors)} ({'held out' if result.predicted else 'fitted'})"
-    )
+    found = f"{_error(errors)} ({'held out' if result.predicted else 'fitted'})"
     yield Picture(
         "figure",
         fit_figure(report),
         f"Intensity and, where measured, degree of linear polarisation of {what}: {found}.",
         "Points: measured. Lines: the fitted model. Open points and broken lines: held out, not fitted.",
     )
+    elements = next((name for name in result.data.channels if name.startswith("m")), "")
     if (figure := polarisation_figure(report)) is not None:
         yield Picture(
             "polarisation",
             figure,
             f"Polarised light of {what}, a panel for each of {len(figure.axes)} quantities.",
-            "Normalised Mueller elements in their places, m00 itself."
-            if "m00_measured" in result.comparison
+            "Normalised Mueller elements in their places" + (", m00 itself." if elements == "m00" else ".")
+            if elements
             else "Q = Ip − Is: negative as by reflection. The angle of polarisation is drawn where the polarised light "
             "stands out of its noise; 0° is p, 90° is s.",
         )
@@ -91,7 +92,12 @@ def pictures(report: Report) -> Iterator[Picture]:
         )
 
 
-def _median(errors: dict) -> str:  # type: ignore[type-arg]
-    from pbrdf.report.numbers import per_cent
+def _error(errors: dict[str, Prediction]) -> str:
+    """The error of the intensity, or where only ratios were measured, of these."""
+    from pbrdf.report.numbers import brief, per_cent
 
-    return per_cent(errors["all"].intensity_median) if "all" in errors else "–"
+    everything = errors.get("all")
+    if everything is None or math.isfinite(everything.intensity_median):
+        return f"median error of the intensity {per_cent(everything.intensity_median) if everything else '–'}"
+    rms = everything.dolp_rms if math.isfinite(everything.dolp_rms) else everything.ratio_rms
+    return f"rms error of the normalised polarisation {brief(rms, 2)}"

@@ -67,5 +67,6 @@ def polarisation_figure(report: Report) -> Figure | None:
             if elements:
                 ax.set_title(ax.get_ylabel().removeprefix("modelled "), fontsize=9.0)
                 ax.set_ylabel("")
-                ax.set_xlabel("θr (°)" if shown.cuts and i >= 12 else "")
+                angle = "θi (°)" if shown.cuts and shown.cuts[0].over_incidence else "θr (°)"
+                ax.set_xlabel(angle if shown.cuts and i >= 12 else "")
         return figure

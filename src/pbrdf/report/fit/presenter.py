@@ -72,10 +72,14 @@ def _errors(what: str, by_region: dict[str, Prediction]) -> list[str]:
     if "all" not in by_region:
         return []
     errors = by_region["all"]
-    sentence = f"{what}: median error of the intensity {per_cent(errors.intensity_median)}"
+    parts = []
+    if math.isfinite(errors.intensity_median):
+        parts.append(f"median error of the intensity {per_cent(errors.intensity_median)}")
     if math.isfinite(errors.dolp_rms):
-        sentence += f", rms error of the degree of linear polarisation {brief(errors.dolp_rms, 2)}"
-    return [sentence]
+        parts.append(f"rms error of the degree of linear polarisation {brief(errors.dolp_rms, 2)}")
+    if math.isfinite(errors.ratio_rms):
+        parts.append(f"rms error of the ratios {brief(errors.ratio_rms, 2)}")
+    return [f"{what}: {', '.join(parts)}"] if parts else []
 
 
 def _row(name: str, estimate: Estimate, described: bool) -> str:

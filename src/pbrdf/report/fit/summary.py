@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pbrdf.data.schema import written
 from pbrdf.inversion.comparison import NEAR_SPECULAR, near_specular_tilt
 from pbrdf.inversion.estimates import Estimate
 from pbrdf.inversion.result import FitResult
@@ -220,7 +221,11 @@ def _channels(result: FitResult) -> str:
     names = list(result.goodness.r_squared)
     if names[0].startswith("m") and len(names) == 16:
         return "all 16 Mueller elements"
-    return ", ".join("DoLP" if name == "dolp" else name for name in names)
+    ratios = [name for name in names if name.endswith("_over_m00")]
+    if len(ratios) == 15:
+        names = [name for name in names if name not in ratios]
+        return ", ".join([*names, "all 15 Mueller elements over m00"])
+    return ", ".join("DoLP" if name == "dolp" else written(name) for name in names)
 
 
 def _headed(rows: list[tuple[str, list[str]]]) -> Table:
@@ -322,9 +327,11 @@ def goodness_in_words(result: FitResult) -> list[str]:
     without_signal = [name for name in g.r_squared if _is_noise(result, name)]
     r_squared = {name: value for name, value in g.r_squared.items() if name not in without_signal}
     if r_squared:
-        lines.append("R²: " + ", ".join(f"{name} {_r_squared(value)}" for name, value in r_squared.items()))
+        lines.append(
+            "R²: " + ", ".join(f"{written(name)} {_r_squared(value)}" for name, value in r_squared.items())
+        )
     if without_signal:
-        lines.append(f"within their noise of 0, so without an R²: {', '.join(without_signal)}")
+        lines.append(f"within their noise of 0, so without an R²: {', '.join(map(written, without_signal))}")
     lines.append(
         f"AIC {brief(g.aic, 5)}, BIC {brief(g.bic, 5)} (lower is better, among models of the same data)"
     )
@@ -406,18 +413,27 @@ def _correlation_table(result: FitResult) -> Table:
 
 def _error_table(result: FitResult) -> Table:
     """Errors model − measured by region, of what was fitted and of what was predicted."""
-    polarised = any(math.isfinite(p.dolp_rms) for p in (*result.fitted.values(), *result.predicted.values()))
+    everywhere = (*result.fitted.values(), *result.predicted.values())
+    intensity = any(math.isfinite(p.intensity_rms) for p in everywhere)
+    polarised = any(math.isfinite(p.dolp_rms) for p in everywhere)
+    ratios = any(math.isfinite(p.ratio_rms) for p in everywhere)
     table = bare_table()
     table.add_column("errors,\nmodel − measured", no_wrap=True)
     table.add_column("\nnumber", justify="right")
-    heads = ["intensity\nmedian", "\nrms", "\nlargest", *(["DoLP\nrms", "\nlargest"] if polarised else [])]
+    heads = ["intensity\nmedian", "\nrms", "\nlargest"] if intensity else []
+    heads += ["DoLP\nrms", "\nlargest"] if polarised else []
+    heads += ["ratios\nrms", "\nlargest"] if ratios else []
     for head in heads:
         table.add_column(head, justify="right")
     for what, regions in (("predicted", result.predicted), ("fitted", result.fitted)):
         for region, p in regions.items():
-            cells = [per_cent(p.intensity_median), per_cent(p.intensity_rms), per_cent(p.intensity_max)]
+            cells = []
+            if intensity:
+                cells += [per_cent(p.intensity_median), per_cent(p.intensity_rms), per_cent(p.intensity_max)]
             if polarised:
                 cells += [_dolp(p.dolp_rms), _dolp(p.dolp_max)]
+            if ratios:
+                cells += [_dolp(p.ratio_rms), _dolp(p.ratio_max)]
             style = "bold" if what == "predicted" else None
             table.add_row(f"{what}, {region}", str(p.count), *cells, style=style)
     return table

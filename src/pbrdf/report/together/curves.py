@@ -88,7 +88,8 @@ def mueller_figure(sources: Sequence[Source], theta_i: float | None = None) -> F
         for i, (ax, name) in enumerate(zip(axes.ravel(), names, strict=True)):
             ax.set_title(quantity_label(name), fontsize=9.0)
             ax.set_ylabel("")
-            ax.set_xlabel("θr (°)" if i >= 12 else "")
+            angle = "θi (°)" if plane.kind in ("theta_r", "mirror") else "θr (°)"
+            ax.set_xlabel(angle if i >= 12 else "")
         return figure
 
 
@@ -174,6 +175,6 @@ def _label(name: str, sources: Sequence[Source]) -> str:
 
 
 def _axis(plane: Plane, columns: int) -> str:
-    if plane.kind == "theta_r":
+    if plane.kind in ("theta_r", "mirror"):
         return "angle of incidence θi (°)"
     return VIEWING_ANGLE if columns == 1 else "viewing angle θr (°)"

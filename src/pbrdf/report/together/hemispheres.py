@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pbrdf.errors import DataError
 from pbrdf.report.dataset.panels import LOGARITHMIC_FROM, dress_hemisphere
 from pbrdf.report.polar_surface import draw_directions, draw_polar_surface, polar_surface
 from pbrdf.report.style import RED, new_figure, styled
@@ -56,7 +57,7 @@ def hemispheres_figure(sources: Sequence[Source], theta_i: float | None = None) 
     Raises
     ------
     DataError
-        If the data were measured under different light.
+        If the data were measured under different light, or hold neither intensity nor DoLP.
     """
     angle = incidence_of(sources, theta_i)
     views = _views(sources, angle, fine=True)
@@ -174,7 +175,13 @@ def _grid(angle: float, fine: bool) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _names(views: Sequence[_View]) -> list[str]:
-    return [name for name in _LABELS if any(name in view.values for view in views)]
+    names = [name for name in _LABELS if any(name in view.values for view in views)]
+    if not names:
+        raise DataError(
+            f"{views[0].title}: neither intensity nor degree of linear polarisation was measured; draw the data with "
+            "--kind curves or mueller"
+        )
+    return names
 
 
 def _radius(name: str, values: Sequence[np.ndarray]) -> tuple[Callable[[np.ndarray], np.ndarray], str]:

@@ -125,8 +125,8 @@ class Plane:
     @property
     def title(self) -> str:
         """What is constant, in a formula."""
-        left = {"theta_i": "θi", "theta_r": "θr", "bistatic": "θi + θr"}[self.kind]
-        return f"{left} = {round(self.constant, 1):g}°"
+        left = {"theta_i": "θi", "theta_r": "θr", "bistatic": "θi + θr", "mirror": "θr − θi"}[self.kind]
+        return f"{left} = {round(self.constant, 1) + 0.0:g}°"
 
     def path(self) -> Cut:
         """The line along which models are drawn: through the data, or where there are none, all of it."""
@@ -135,7 +135,9 @@ class Plane:
         fine = np.arange(low, high + _STEP / 2.0, _STEP)
         # the mirror direction is a point of the curve: a narrow peak has its top there
         mirror = {"theta_i": self.constant, "theta_r": abs(self.constant), "bistatic": self.constant / 2.0}
-        x = np.unique(np.append(fine, np.clip(mirror[self.kind], low, high)))
+        x = fine
+        if self.kind in mirror:  # a viewer that follows the source is always or never there
+            x = np.unique(np.append(fine, np.clip(mirror[self.kind], low, high)))
         return Cut(self.kind, self.constant, "", np.empty(0, dtype=int), x, x)
 
 
@@ -211,11 +213,23 @@ def incidence_of(sources: Sequence[Source], theta_i: float | None) -> float:
 
 
 def measured_names(sources: Sequence[Source]) -> list[str]:
-    """Quantities of Stokes vectors that are drawn: those that were measured, or without data what a model has."""
+    """Quantities of Stokes vectors that are drawn: those that were measured, or without data what a model has.
+
+    Raises
+    ------
+    DataError
+        If none of them was measured.
+    """
     wanted = ("intensity", "Q/I", "U/I", "V/I", "dolp", "aolp")
     if all(source.dataset is None for source in sources):
         return ["intensity", "Q/I", "dolp"]
-    return [name for name in wanted if any(source.channel(name) is not None for source in sources)]
+    names = [name for name in wanted if any(source.channel(name) is not None for source in sources)]
+    if not names:
+        listed = ", ".join(source.name for source in sources)
+        raise DataError(
+            f"{listed}: there are elements of Mueller matrices alone; draw them with --kind mueller"
+        )
+    return names
 
 
 def light_of(sources: Sequence[Source]) -> tuple[float, ...]:

@@ -16,9 +16,10 @@ instead be given to :func:`pbrdf.data.formats.csv_table.reading.read_csv` as an 
 =================== ================================================= ====================================
 key                 values                                            if it is not stated
 =================== ================================================= ====================================
-``quantity``        brdf, reflectance_factor, radiance, dn            taken from a column called ``brdf``,
-                                                                      ``f_r``, ``reflectance_factor``,
-                                                                      ``radiance`` or ``dn``, else an error
+``quantity``        brdf, reflectance_factor, radiance, dn,           taken from a column called ``brdf``,
+                    normalised                                        ``f_r``, ``reflectance_factor``,
+                                                                      ``radiance`` or ``dn``, normalised where
+                                                                      there are only ratios, else an error
 ``azimuth``         forward=0 or forward=180                          forward=0 assumed
 ``stokes``          p-s or s-p                                        p-s assumed
 ``illumination``    natural, or four numbers ``1,0,0,0``              natural
@@ -31,7 +32,8 @@ key                 values                                            if it is n
 about polarisation and azimuth is recorded in the attribute ``assumptions``.
 
 **Columns.** ``theta_i``, ``theta_r``, ``phi``, ``wavelength``, ``group``, ``I``, ``Q``, ``U``, ``V``,
-``dolp``, ``aolp``, ``m00`` … ``m33``, ``<name>_std``, and the covariances ``cov_IQ``, ``cov_IU``,
+``dolp``, ``aolp``, ``m00`` … ``m33``, ratios such as ``Q/I`` or ``M12/M11``
+(:mod:`pbrdf.data.formats.csv_table.ratios`), ``<name>_std``, and the covariances ``cov_IQ``, ``cov_IU``,
 ``cov_IV``, ``cov_QU``, ``cov_QV``, ``cov_UV``; case, spaces, hyphens and underscores do not matter, and some
 usual synonyms are understood (``incidence``, ``zenith_i``, ``lambda``, ``s0`` … ``s3``).
 A unit in the name, ``_deg``, ``_rad``, ``_nm``, ``_um`` or ``[deg]``, counts before the header's. Other

@@ -14,12 +14,21 @@ from pbrdf.data.build import assemble
 from pbrdf.data.covariance import square
 from pbrdf.data.formats.csv_table.columns import CHANNELS, COVARIANCES, ELEMENTS, Column
 from pbrdf.data.formats.csv_table.header import Header
-from pbrdf.data.schema import QUANTITIES, std_name
+from pbrdf.data.formats.csv_table.ratios import (
+    already_divided,
+    gather_ratios,
+    swap_sp_of_ratios,
+    without_derived,
+)
+from pbrdf.data.schema import NORMALISED, QUANTITIES, RATIOS, only_ratios, std_name
 from pbrdf.errors import DataError
 from pbrdf.files.delimited import Table
 from pbrdf.optics.stokes import STOKES
 
 __all__ = ["to_dataset"]
+
+#: Variables whose sign depends on what Q > 0 means.
+_SIGNED = {"Q", "U", "aolp", "mueller", "Q_over_I", "U_over_I", "mueller_over_m00"}
 
 
 def to_dataset(
@@ -56,7 +65,17 @@ def to_dataset(
     """
     assumptions = []
     azimuth = next((column for column in columns if column.variable == "phi"), None)
-    if azimuth is not None:
+    if azimuth is None and _in_mirror_direction(columns):
+        turned = values["theta_i"] < 0
+        if "group" not in values and turned.any() and not turned.all():
+            values["group"] = np.where(turned, "negative side", "positive side")
+        values["theta_i"] = values["theta_r"] = np.abs(values["theta_i"])
+        values["phi"] = np.zeros_like(values["theta_i"])
+        assumptions.append(
+            "theta_i and theta_r are the same column; the viewer was taken in the mirror direction (phi = 0), and "
+            "the sign as the side of the normal on which the source stands"
+        )
+    elif azimuth is not None:
         if "azimuth" in header.unstated and azimuth.index is not None:
             assumptions.append("the file does not say where phi = 0 lies; the forward half-plane was assumed")
         phi = values["phi"]
@@ -72,18 +91,24 @@ def to_dataset(
 
     channels = {name: values[name] for name in CHANNELS if name in values}
     std = {name: values[std_name(name)] for name in CHANNELS if std_name(name) in values}
-    channels, std = _gather_mueller(channels), _gather_mueller(std)
+    channels, std = (gather_ratios(_gather_mueller(part)) for part in (channels, std))
+    if header.quantity == NORMALISED:
+        try:
+            channels, std = already_divided(channels, std)
+        except DataError as error:
+            raise DataError(f"{table.path}: {error}") from None
+    assumptions += without_derived(channels, std)
     covariance = _gather_covariance(values)
-    if "stokes" in header.unstated and channels.keys() & {"Q", "U", "aolp", "mueller"}:
+    if "stokes" in header.unstated and channels.keys() & _SIGNED:
         assumptions.append("the file does not say what Q > 0 means; Q = I_p - I_s was assumed")
     illumination = header.illumination
     if not header.p_minus_s:
         illumination = conventions.stokes_swap_sp(illumination).tolist()
-        channels = _swap_sp(channels)
+        channels = swap_sp_of_ratios(_swap_sp(channels))
         covariance = None if covariance is None else conventions.covariance_swap_sp(covariance)
     if header.cosine_weighted:
         for part in (channels, std):
-            for name in part.keys() - {"dolp", "aolp"}:
+            for name in part.keys() - set(RATIOS):
                 part[name] = conventions.remove_cosine_weight(part[name], values["theta_r"])
         if covariance is not None:
             for _ in range(2):
@@ -99,7 +124,7 @@ def to_dataset(
     coordinates = {name: values.get(name) for name in ("theta_i", "theta_r", "phi", "wavelength", "group")}
     attrs = {
         **header.attrs,
-        "quantity": _quantity(table, header, columns),
+        "quantity": _quantity(table, header, columns, only_ratios(channels)),
         "illumination": illumination,
         **extra,
     }
@@ -107,6 +132,12 @@ def to_dataset(
         return assemble(coordinates, channels, std, attrs, covariance)
     except DataError as error:
         raise DataError(f"{table.path}: {error}") from None
+
+
+def _in_mirror_direction(columns: list[Column]) -> bool:
+    """Whether one column of the file holds both zenith angles."""
+    found = {column.variable: column.index for column in columns}
+    return found["theta_i"] is not None and found["theta_i"] == found["theta_r"]
 
 
 def _require_positive_incidence(table: Table, theta_i: NDArray[np.float64], columns: list[Column]) -> None:
@@ -119,12 +150,15 @@ def _require_positive_incidence(table: Table, theta_i: NDArray[np.float64], colu
         )
 
 
-def _quantity(table: Table, header: Header, columns: list[Column]) -> str:
+def _quantity(table: Table, header: Header, columns: list[Column], ratios: bool) -> str:
+    if header.quantity is None and ratios:
+        return NORMALISED
     implied = next((c.quantity for c in columns if c.variable == "I"), None)
     if header.quantity is None and implied is None:
         raise DataError(
             f"{table.path}: it does not say what was measured; add a line '# quantity: …' or the option "
             f"quantity, one of {', '.join(QUANTITIES)}"
+            + ("" if any(c.variable in ("I", "m00") for c in columns) else " (divided by an intensity)")
         )
     return header.quantity or str(implied)
 

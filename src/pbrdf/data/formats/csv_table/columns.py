@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+from pbrdf.data.formats.csv_table.ratios import RATIO_ELEMENTS, ratio_variable
 from pbrdf.data.schema import VARIABLES, std_name
 from pbrdf.errors import DataError
 from pbrdf.optics.stokes import STOKES
@@ -14,7 +15,7 @@ from pbrdf.optics.stokes import STOKES
 __all__ = ["ANGLE_COLUMNS", "CHANNELS", "COVARIANCES", "ELEMENTS", "Column", "resolve_columns"]
 
 ELEMENTS = tuple(f"m{i}{j}" for i in range(4) for j in range(4))
-CHANNELS = (*(name for name in VARIABLES if name != "mueller"), *ELEMENTS)
+CHANNELS = (*(name for name in VARIABLES if not name.startswith("mueller")), *ELEMENTS, *RATIO_ELEMENTS)
 #: Columns of the covariance by the position of their entry, the upper triangle with the diagonal.
 COVARIANCES = {(i, j): f"cov_{STOKES[i]}{STOKES[j]}" for i in range(4) for j in range(i, 4)}
 _COLUMNS = (
@@ -88,6 +89,8 @@ class Column:
 def _parse_name(name: str) -> tuple[str | None, str | None, str | None]:
     """Variable, unit and quantity that a column name says, each None if it does not."""
     text = name.strip().lower()
+    if (ratio := ratio_variable(text)) is not None:
+        return ratio, None, None
     unit = None
     bracketed = re.search(r"[\[(]\s*([^\])]*?)\s*[\])]", text)
     if bracketed:
@@ -102,7 +105,7 @@ def _parse_name(name: str) -> tuple[str | None, str | None, str | None]:
     if words[-2:] == ["per", "sr"]:
         words = words[:-2]
     key = "".join(words)
-    variable = _VARIABLE_OF.get(key)
+    variable = _VARIABLE_OF.get(key) or ratio_variable(key)
     if variable is not None and deviation:
         variable = std_name(variable)
     return (variable if variable in _COLUMNS else None), unit, _QUANTITY_OF.get(key)
@@ -157,23 +160,34 @@ def resolve_columns(
             )
         else:
             columns[found] = Column(found, index, unit=unit, quantity=quantity)
+    viewer = columns.get("theta_r")
+    if "theta_i" not in columns and viewer is not None and viewer.index in _named(names, "theta_i"):
+        columns["theta_i"] = replace(
+            viewer, variable="theta_i"
+        )  # the mirror configuration: one angle for both
     for variable in ("theta_i", "theta_r"):
         if variable not in columns:
             raise DataError(
-                f"{path}: there is no column {variable}; name it with column={{{variable!r}: …}}. "
+                f"{path}: there is no column {variable}; name it with column={{{variable!r}: …}}"
+                f"{', that of theta_i for the mirror direction' if variable == 'theta_r' else ''}. "
                 f"The columns are {', '.join(names)}"
             )
     _reject_suspicious(path, ignored, "phi" in columns)
     return list(columns.values()), ignored
 
 
+def _named(names: Sequence[str], variable: str) -> list[int]:
+    """Positions of the columns whose name says that they are a variable."""
+    return [index for index, name in enumerate(names) if _parse_name(name)[0] == variable]
+
+
 def _mapped_column(path: Path, names: Sequence[str], variable: str, name: str) -> Column:
     if variable not in _COLUMNS:
-        many = (*ELEMENTS, *COVARIANCES.values())
+        many = (*ELEMENTS, *RATIO_ELEMENTS, *COVARIANCES.values())
         plain = ", ".join(name for name in _COLUMNS if name not in many and not name.endswith("_std"))
         raise DataError(
-            f"{path}: no column is called {variable!r} here; use {plain}, m00 … m33, a channel with _std, or "
-            "cov_IQ … cov_UV"
+            f"{path}: no column is called {variable!r} here; use {plain}, m00 … m33, m01_over_m00 … "
+            "m33_over_m00, a channel with _std, or cov_IQ … cov_UV"
         )
     if name.startswith("="):
         return Column(variable, None, constant=name[1:].strip())

@@ -11,6 +11,7 @@ from pbrdf.data import conventions
 from pbrdf.data.build import group_labels
 from pbrdf.data.formats.csv_table.columns import ANGLE_COLUMNS, Column
 from pbrdf.data.formats.csv_table.header import Header
+from pbrdf.data.formats.csv_table.ratios import ratios_of_column
 from pbrdf.errors import DataError
 from pbrdf.files.delimited import Table
 
@@ -57,7 +58,8 @@ def column_values(table: Table, column: Column, header: Header) -> NDArray[Any]:
     if column.variable == "wavelength":
         _require_unit(table, column, ("nm", "um"))
         return values * 1000 if column.unit == "um" else values
-    return values
+    name = "" if column.index is None else table.names[column.index]
+    return ratios_of_column(values, column.variable, name, column.unit)
 
 
 def _labels(table: Table, column: Column) -> NDArray[Any]:

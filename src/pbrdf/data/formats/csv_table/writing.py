@@ -13,6 +13,7 @@ from pbrdf.data.covariance import derived_variance
 from pbrdf.data.degrees import exact_degrees
 from pbrdf.data.formats.attributes import encode_attribute, plain_attributes
 from pbrdf.data.formats.csv_table.columns import COVARIANCES, ELEMENTS
+from pbrdf.data.formats.csv_table.ratios import RATIO_ELEMENTS
 from pbrdf.data.schema import COVARIANCE, NATURAL_LIGHT, VARIABLES, std_name
 from pbrdf.data.validation import validate
 from pbrdf.files.delimited import write_table
@@ -63,10 +64,10 @@ def _text_columns(ds: xr.Dataset) -> Iterator[tuple[str, list[str]]]:
                 continue
             if channel == "aolp":
                 yield _text_angle(ds, name)
-            elif channel == "mueller":
+            elif channel in ("mueller", "mueller_over_m00"):
                 flat = ds[name].values.reshape(-1, 16)
-                for position, element in enumerate(ELEMENTS):
-                    yield element + name.removeprefix("mueller"), _text(flat[:, position])
+                for position, element in enumerate(ELEMENTS if channel == "mueller" else RATIO_ELEMENTS):
+                    yield element + name.removeprefix(channel), _text(flat[:, position])
             else:
                 yield name, _text(ds[name].values)
     if COVARIANCE in ds.data_vars:
