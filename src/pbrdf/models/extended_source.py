@@ -139,17 +139,18 @@ def _averaged_specular(
     template = model.kernel(geometry, values, "specular")
     used = [(i, j) for i in range(4) for j in range(4) if not is_zero(template[i][j])]
 
-    def body(k: Any, total: Any, geometry: Geometry, radius: Any, given: Any) -> tuple[Any, ...]:
+    def body(k: Any, total: Any, vectors: Any, radius: Any, given: Any) -> tuple[Any, ...]:
+        geometry = Geometry(*vectors)
         named = {**values, **dict(zip(names, given, strict=True))}
         x, y, weight = (dr.gather(F, column, k) for column in columns)
         ray = _turned(geometry, radius * x, radius * y)
         weight = weight * ray.cos_i / geometry.cos_i  # its share of the irradiance
         f = model.kernel(ray, named, "specular")
         total = [dr.fma(weight, f[i][j], t) for (i, j), t in zip(used, total, strict=True)]
-        return k + 1, total, geometry, radius, given
+        return k + 1, total, vectors, radius, given
 
     sums = dr.while_loop(
-        (UInt(0), [dr.zeros(F, 1) for _ in used], geometry, radius, [values[name] for name in names]),
+        (UInt(0), [dr.zeros(F, 1) for _ in used], tuple(geometry), radius, [values[name] for name in names]),
         lambda k, *_: k < count,
         body,
         label="source",
