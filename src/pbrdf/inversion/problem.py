@@ -388,7 +388,6 @@ def _penalty(space: Space) -> Any:
         return None
 
     def penalty(u: list[Any]) -> list[tuple[int, Any, Any]]:
-        import drjit as dr
 
         found = []
         for i, (term, p) in enumerate(zip(space.terms, space.free, strict=True)):

@@ -708,7 +708,7 @@ def _damped_step(
 
 
 def _nothing_to_gain(solution: Solution, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
-    """Numbers of the lanes that stopped short of a minimum, though no step, however long, promises more than nothing."""
+    """Numbers of the lanes that stopped short though no step, however long, promises more than nothing."""
     found = []
     for lane in np.flatnonzero(np.isin(solution.status, (Status.STALLED, Status.ITERATIONS))):
         u, g, A = solution.u[lane], solution.gradient[lane], solution.information[lane]
