@@ -10,7 +10,10 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from rich.console import Console
 
-__all__ = ["fail", "output_console", "progress_bar", "reading_width", "stage_bar", "warn"]
+__all__ = ["NOT_CONVERGED", "fail", "output_console", "progress_bar", "reading_width", "stage_bar", "warn"]
+
+#: Exit code of a command whose fit has not converged: everything is written, but its numbers are no result.
+NOT_CONVERGED = 3
 
 #: Lines longer than this are hard to read, however wide the terminal is.
 _WIDEST = 110

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from pbrdf.cli.command_line import command_line
-from pbrdf.cli.console import output_console, progress_bar
+from pbrdf.cli.console import NOT_CONVERGED, output_console, progress_bar
 from pbrdf.cli.options import (
     Backend,
     noise_option,
@@ -66,6 +66,7 @@ def fit(
         typer.Option(help="Value where every start begins, e.g. n=1.6 (repeatable).", metavar="NAME=VALUE"),
     ] = None,
     starts: Annotated[int, typer.Option(help="Number of starts, spread over the bounds.")] = 64,
+    iterations: Annotated[int, typer.Option(help="Steps of each start at most.", min=1)] = 100,
     noise: Annotated[
         str | None,
         noise_option(
@@ -170,6 +171,8 @@ def fit(
     comparison.nc (measured, modelled, residual), fit.nc (for pbrdf.load_fit) and the figures: figure.png, starts.png,
     polarisation.png and hemisphere.png where there is such data, contours.png with --contour.
 
+    Exit code 3: a fit has not converged, its numbers are no result.
+
     With bundled data: `pbrdf fit matte-white-thick --hold-out group=3`
 
     With your own: `pbrdf fit paint.csv --column I=f_r_per_sr --noise 3%,1% --fix n=1.5`
@@ -188,6 +191,7 @@ def fit(
         "bounds": read_bounds(bounds or (), "--bounds", "sigma=0.01:0.2"),
         "start": numbers(start or (), "--start", "n=1.6"),
         "starts": starts,
+        "max_iterations": iterations,
         "noise": noise,
         "hold_out": hold_out,
         "strategy": strategy,
@@ -214,6 +218,7 @@ def fit(
 
     from pbrdf.inversion import fit as fit_dataset
 
+    unsettled = False
     for file, folder in zip(files, folders, strict=True):
         dataset = reading.open(file)
         try:
@@ -239,6 +244,7 @@ def fit(
             result, dataset, file, settings, checks, command=command_line(), sha256=sha256_of(Path(file))
         )
         written = write_report(report, folder, figure_format=figure_format, figures=figures)
+        unsettled |= not result.settled
         if quiet:
             print(folder)
             continue
@@ -247,6 +253,8 @@ def fit(
         console = output_console()
         print_summary(report, console, verbose=verbose)
         console.print(f"\nWritten to {folder}/: {', '.join(path.name for path in written)}", markup=False)
+    if unsettled:
+        raise typer.Exit(NOT_CONVERGED)
 
 
 def _prior(name: str, text: str) -> tuple[float, float]:

@@ -30,7 +30,7 @@ __all__ = ["contradicted_conventions", "readings"]
 CONTRADICTED = 0.5
 #: … and the verdict becomes a better one, or χ² falls to this share.
 PLAINLY = 0.1
-_BETTER = {Level.DOES_NOT: 0, Level.IN_PART: 1, Level.DESCRIBES: 2}
+_BETTER = {Level.NOT_CONVERGED: -1, Level.DOES_NOT: 0, Level.IN_PART: 1, Level.DESCRIBES: 2}
 _RADIOMETRIC = ("I", "Q", "U", "V", "mueller")
 
 

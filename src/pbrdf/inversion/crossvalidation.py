@@ -131,7 +131,7 @@ class CrossValidation:
                 )
         failed = [f.label for f in self.folds if not f.converged]
         if failed:
-            lines.append(f"Not converged: {', '.join(failed)}; raise max_iterations or starts.")
+            lines.append(f"Not converged: {', '.join(failed)}; try more starts.")
         return lines
 
 

@@ -203,7 +203,7 @@ def _summarise(
 ) -> FitResult:
     import xarray as xr
 
-    best = int(np.nanargmin(np.where(np.isfinite(solution.cost), solution.cost, np.nan)))
+    best = solution.best()
     values = space.to_parameters(solution.u[best])
     values = np.clip(values, space.lower, space.upper)
     model = space.build(values)
@@ -224,7 +224,7 @@ def _summarise(
         fitted_data.std_known,
     )
     estimates, correlation = estimates_at(space, values, solution, best, fitted_data, quality)
-    optima = distinct_optima(space, solution)
+    optima = distinct_optima(space, solution, best)
     regions = {"all": np.ones_like(held), "near-specular": near, "off-specular": ~near}
 
     def by_region(chosen: np.ndarray) -> dict[str, Prediction]:
@@ -256,6 +256,7 @@ def _summarise(
         data=fitted_data,
         unknowns=solution.u[best],
         information=solution.information[best],
+        settled=bool(solution.converged[best]),
         start_values=space.to_parameters(first),
         end_values=space.to_parameters(solution.u),
         chi2_by_start=2.0 * solution.cost,

@@ -24,7 +24,7 @@ import numpy as np
 from pbrdf.inversion.optimum import Optimum
 from pbrdf.inversion.refits import Optima
 from pbrdf.inversion.statistics import covariance, prior_spread
-from pbrdf.inversion.verdict import Level, verdict
+from pbrdf.inversion.verdict import verdict
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -103,7 +103,10 @@ class Identifiability:
     def sentences(self) -> list[str]:
         """The findings in words."""
         if not self.described:
-            return ["Nothing can be said of what the data determine, as the model does not describe them."]
+            return [
+                "Nothing can be said of what the data determine, as the model does not describe them, or the fit has "
+                "not converged."
+            ]
         found = [combination.sentence for combination in self.combinations]
         inside = [str(name) for name in self.parameters["parameter"].values]
         if not found and not self.at_bound:
@@ -135,7 +138,7 @@ def identifiability(result: Optimum, *, described: bool | None = None) -> Identi
     import xarray as xr
 
     if described is None:
-        described = verdict(result).level != Level.DOES_NOT
+        described = verdict(result).level.usable
 
     optima = Optima.of(result)
     space = result.space

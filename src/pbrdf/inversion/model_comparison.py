@@ -561,8 +561,8 @@ def _remarks(f: _Fitted, leads: bool, behind: Paired) -> list[str]:
         remarks.append("best")
     elif not behind.apart:
         remarks.append("not told apart")
-    if not f.result.converged:
-        remarks.append("no start converged")
+    if not f.result.settled:
+        remarks.append("not converged")
     if f.bad_folds:
         remarks.append(f"not converged without {', '.join(f.bad_folds)}")
     on_bounds = [name for name, e in f.result.estimates.items() if _on_bound(e)]

@@ -159,6 +159,12 @@ class Solution:
         """Mask of the lanes that stand at a minimum, shape (B,)."""
         return np.isin(self.status, [s for s in Status if s.converged])
 
+    def best(self) -> int:
+        """Number of the lane of the lowest cost: among those as low but for rounding, one at a minimum."""
+        cost = np.where(np.isfinite(self.cost), self.cost, np.inf)
+        as_low = np.flatnonzero(cost <= cost.min() * (1.0 + NOTHING_TO_GAIN))
+        return int(min(as_low, key=lambda lane: (not self.converged[lane], cost[lane])))
+
 
 def solve(
     residuals: Residuals,
