@@ -188,6 +188,11 @@ class Comparison:
 
     def _verdict(self) -> list[str]:
         best = self.best
+        if not best.result.settled:
+            return [
+                f"The fit of {best.name}, which predicts best, has not converged: its numbers are no result; try more "
+                "--starts."
+            ]
         missed = f"it misses what it has not seen by {_error(best.score, best.uncertainty)} ({self.score_in_words})"
         if best.score <= DESCRIBES:
             return [f"{best.name} predicts best: {missed}."]

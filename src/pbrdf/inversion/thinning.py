@@ -7,7 +7,7 @@ for those of its stratum that were left out, so χ² of the part estimates χ² 
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from pbrdf.inversion.observations import Observations
 from pbrdf.inversion.problem import Space
 from pbrdf.optics.half_difference import facet_tilt
 
-__all__ = ["thinned"]
+__all__ = ["Part", "draw", "thinned"]
 
 #: Geometries that are enough to search, at least, and for each unknown.
 ENOUGH, FOR_EACH_UNKNOWN = 1200, 40
@@ -26,13 +26,40 @@ _TILT = np.array([0.1, 0.2, 0.5, 1.0, 2.0, 4.0, 7.0, 12.0, 20.0, 35.0])
 _ZENITH = np.arange(10.0, 90.0, 10.0)
 
 
-def thinned(space: Space, data: Observations, seed: int = 0) -> Observations | None:
-    """Part of the geometries, weighted to stand for all; None where there are not many more than are enough.
+@dataclass(frozen=True)
+class Part:
+    """Geometries that stand for all.
+
+    Attributes
+    ----------
+    rows
+        Their numbers, shape (g,).
+    weight
+        How many each counts for, shape (g,).
+    """
+
+    rows: np.ndarray
+    weight: np.ndarray
+
+    def of(self, data: Observations) -> Observations:
+        """The part of a data set of the same geometries."""
+        part = data.subset(self.rows)
+        return replace(part, std=part.std / np.sqrt(self.weight))
+
+
+def thinned(space: Space, data: Observations) -> Observations | None:
+    """Part of the geometries, weighted to stand for all; None where there are not many more than are enough."""
+    part = draw(space, data)
+    return None if part is None else part.of(data)
+
+
+def draw(space: Space, data: Observations, seed: int = 0) -> Part | None:
+    """Draw part of the geometries; None where there are not many more than are enough.
 
     Parameters
     ----------
     space
-        The problem: a robust loss, which is no sum of squares, gets the part without weights.
+        The problem: with a robust loss, which is no sum of squares, each counts for itself only.
     data
         All observations.
     seed
@@ -40,7 +67,7 @@ def thinned(space: Space, data: Observations, seed: int = 0) -> Observations | N
 
     Returns
     -------
-    Observations or None
+    Part or None
     """
     enough = max(ENOUGH, FOR_EACH_UNKNOWN * len(space.free))
     used = np.flatnonzero(np.isfinite(data.std).any(axis=0))
@@ -56,8 +83,7 @@ def thinned(space: Space, data: Observations, seed: int = 0) -> Observations | N
     chosen = np.lexsort((chance, place))[:enough]
     drawn = np.bincount(stratum[chosen], minlength=len(sizes))
     weight = (sizes / np.maximum(drawn, 1))[stratum[chosen]]
-    part = data.subset(used[chosen])
-    return part if space.loss != "linear" else replace(part, std=part.std / np.sqrt(weight))
+    return Part(used[chosen], weight if space.loss == "linear" else np.ones(enough))
 
 
 def _strata(space: Space, data: Observations, used: np.ndarray) -> np.ndarray:

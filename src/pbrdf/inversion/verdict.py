@@ -208,11 +208,7 @@ def verdict(result: Optimum) -> Verdict:
         level = Level.DESCRIBES
     unsure = [name for name, e in result.estimates.items() if not quotable(e)]
     on_bounds = [name for name in unsure if result.estimates[name].verdict.startswith("at ")]
-    silent = (
-        [n for n, e in result.estimates.items() if e.verdict != "fixed"]
-        if not level.usable
-        else unsure
-    )
+    silent = [n for n, e in result.estimates.items() if e.verdict != "fixed"] if not level.usable else unsure
     return Verdict(
         level,
         _sentence(level, whole, failing, (on_bounds, [n for n in unsure if n not in on_bounds]), nothing),
