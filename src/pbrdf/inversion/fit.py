@@ -155,6 +155,13 @@ def fit(
             f"{fitted_data.count} measured values cannot determine {len(space.free)} parameters: measure "
             "more, hold out less, or fix parameters"
         )
+    places, distinct = fitted_data.distinct(space.labels("group") != [], space.labels("wavelength") != [])
+    if distinct < len(space.free):
+        raise FitError(
+            f"{fitted_data.count} values at {places} {'geometry' if places == 1 else 'different geometries'} cannot "
+            f"determine {len(space.free)} parameters, as repeated readings tell no more of them than "
+            f"{'one does' if places == 1 else 'one at each does'}: measure in more directions, or fix parameters"
+        )
     low, high = space.box
     first = sobol_starts(low, high, starts, seed)
     first = first[np.argsort(first[:, 0])]  # neighbours alike: they then take the same branches
