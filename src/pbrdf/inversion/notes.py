@@ -52,7 +52,7 @@ def notes_on(
             f"{len(rivals)} other optimum(s) fit nearly as well (χ² within 4): the solution is not unique."
         )
     reduced = result.goodness.reduced_chi2
-    if data.std_known and reduced > 2.0:
+    if data.std_known and reduced > 2.0 and result.settled:
         notes.append(
             f"Reduced χ² is {reduced:.3g}: the model departs from the data by more than their stated uncertainty, and "
             f"the standard errors are too small by a factor of about {reduced**0.5:.2g}."
