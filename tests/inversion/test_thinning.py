@@ -71,15 +71,15 @@ def test_a_robust_loss_has_no_weights():
 @pytest.mark.slow
 def test_the_fit_of_dense_data_is_that_of_all_geometries(monkeypatch):
     """The same optimum, χ² and errors as without the part; from few starts, as all geometries are slow."""
-    ds = dense(3600)
+    ds = dense(3000)
     quick = pbrdf.fit(ds, starts=4)
     monkeypatch.setattr(thinning, "ENOUGH", 10**9)
     full = pbrdf.fit(ds, starts=4)
     assert [s.name for s in quick.stages] == ["search", "joint"] and len(full.stages) == 1
-    assert quick.stages[0].points == 1200 and quick.stages[1].points == 3600
-    assert any("searched 1200 of the 3600 geometries" in note for note in quick.notes)
+    assert quick.stages[0].points == 1000 and quick.stages[1].points == 3000
+    assert any("searched 1000 of the 3000 geometries" in note for note in quick.notes)
     assert quick.goodness.chi2 == pytest.approx(full.goodness.chi2, rel=1e-9)
-    assert quick.goodness.data == full.goodness.data == 3600
+    assert quick.goodness.data == full.goodness.data == 3000
     for name, e in full.estimates.items():
         if e.verdict == "determined":
             assert quick.estimates[name].value == pytest.approx(e.value, abs=1e-4 * e.std)

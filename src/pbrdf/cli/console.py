@@ -78,7 +78,7 @@ def stage_bar(quiet: bool = False, first: str = "") -> Iterator[Callable[[str, i
     Yields
     ------
     callable
-        To be called with the name of the stage, the number of its finished pieces and of all.
+        To be called with the name of the stage, the number of its finished pieces and of all, 0 if that is not known.
     """
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
@@ -99,7 +99,7 @@ def stage_bar(quiet: bool = False, first: str = "") -> Iterator[Callable[[str, i
     ) as progress:
         task = progress.add_task(first, total=None)
         yield lambda stage, finished, total: progress.update(
-            task, description=stage, completed=finished, total=total
+            task, description=stage, completed=finished, total=total or None
         )
 
 
@@ -110,7 +110,7 @@ def _lines_now_and_then(first: str) -> Iterator[Callable[[str, int, int], None]]
     state = [first, ""]
 
     def show(stage: str, finished: int, total: int) -> None:
-        state[:] = [stage, f": {finished} of {total}"]
+        state[:] = [stage, f": {finished} of {total}" if total else ""]
 
     def tell() -> None:
         while not over.wait(_EVERY):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from pbrdf.cli.command_line import command_line
-from pbrdf.cli.console import NOT_CONVERGED, output_console, progress_bar
+from pbrdf.cli.console import NOT_CONVERGED, output_console, stage_bar
 from pbrdf.cli.options import (
     Backend,
     noise_option,
@@ -222,8 +223,10 @@ def fit(
     for file, folder in zip(files, folders, strict=True):
         dataset = reading.open(file)
         try:
-            with progress_bar(f"Fitting {file}", quiet) as progress:
+            with stage_bar(quiet, f"Fitting {file}") as show:
+                progress = functools.partial(show, f"Fitting {file}")
                 result = fit_dataset(dataset, chosen, progress=progress, **arguments)
+                show(f"Looking at the fit of {file}", 0, 0)
                 checks = run_checks(
                     result,
                     dataset,

@@ -472,7 +472,9 @@ def _judge(
     length = dr.zeros(type(cost), 1)
     leaving = _leaving(g, u, low, high)
     slope2 = dr.zeros(type(cost), 1)  # largest squared cosine between the residuals and a column of J
+    length_of_box = dr.zeros(type(cost), 1)
     for i in range(size):
+        length_of_box = dr.maximum(length_of_box, high[i] - low[i])
         length = dr.maximum(length, dr.abs(delta[i]) / dr.maximum(high[i] - low[i], 1e-300))
         cosine2 = g[i] * g[i] / dr.maximum(2.0 * A[i][i] * state.cost, 1e-300)
         slope2 = dr.maximum(slope2, dr.select(leaving[i], 0.0, cosine2))
@@ -486,7 +488,10 @@ def _judge(
     status = dr.select(free & (length < tolerance), U(int(Status.SMALL_STEP)), status)
     status = dr.select(slope2 <= tolerance * tolerance, U(int(Status.ZERO_GRADIENT)), status)
     status = dr.select((status == 0) & (state.iterations >= limit), U(int(Status.ITERATIONS)), status)
-    status = dr.select(first, dr.select(finite, U(0), U(int(Status.NOT_FINITE))), status)
+    # where every unknown is held there is nothing to try
+    held = length_of_box <= 0.0
+    begun = dr.select(held, U(int(Status.ZERO_GRADIENT)), U(int(Status.RUNNING)))
+    status = dr.select(first, dr.select(finite, begun, U(int(Status.NOT_FINITE))), status)
 
     def keep(new: list[Any], old: list[Any]) -> list[Any]:
         return [dr.select(accepted, a, b) for a, b in zip(new, old, strict=True)]
