@@ -89,6 +89,8 @@ class Identifiability:
         Not determined or traded off, the worst first.
     described
         Whether the model describes the data at all; if not, no sentence says that they determine anything.
+    settled
+        Whether the fit has converged; if not, the same.
     """
 
     eigenvalues: np.ndarray
@@ -98,15 +100,15 @@ class Identifiability:
     at_bound: list[str]
     combinations: list[Combination] = field(default_factory=list)
     described: bool = True
+    settled: bool = True
 
     @property
     def sentences(self) -> list[str]:
         """The findings in words."""
+        if not self.settled:
+            return ["Nothing can be said of what the data determine, as the fit has not converged."]
         if not self.described:
-            return [
-                "Nothing can be said of what the data determine, as the model does not describe them, or the fit has "
-                "not converged."
-            ]
+            return ["Nothing can be said of what the data determine, as the model does not describe them."]
         found = [combination.sentence for combination in self.combinations]
         inside = [str(name) for name in self.parameters["parameter"].values]
         if not found and not self.at_bound:
@@ -193,6 +195,7 @@ def identifiability(result: Optimum, *, described: bool | None = None) -> Identi
         [space.names[i] for i in np.flatnonzero(optima.at_bound[0])],
         combinations,
         described,
+        result.settled,
     )
 
 
