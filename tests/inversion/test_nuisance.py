@@ -141,7 +141,7 @@ def test_an_extended_source_is_the_average_over_its_disc():
             (1, 0, 0, 0),
             True,
         )
-        found = predict(space, np.array([radius]), data, ["I"])["I"][0]
+        found = predict(space, np.array([radius**2]), data, ["I"])["I"][0]
         point = specular_only.stokes(ti, tr, 0.0)[0]
         assert found == pytest.approx(expected, rel=0.01)
         assert abs(point / expected - 1.0) > 0.03, "the source must matter in this test"
@@ -160,7 +160,7 @@ def test_radius_of_the_source_is_found_and_sigma_with_it():
         (Term("source", nuisance=True),),
     )
     empty = dataset(np.ones((len(theta_i), 4)), theta_i, theta_r, group)
-    signal = predict(space, np.array([math.radians(4.0)]), Observations.from_dataset(empty), "IQUV")
+    signal = predict(space, np.array([math.radians(4.0) ** 2]), Observations.from_dataset(empty), "IQUV")
     ds = dataset(np.column_stack([signal[c] for c in "IQUV"]), theta_i, theta_r, group, noise=0.002)
     result = pbrdf.fit(ds, nuisances=["source"], starts=16)
     assert pull(result.estimates["source"], math.radians(4.0)) < 4.0

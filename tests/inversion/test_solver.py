@@ -241,3 +241,47 @@ def test_linearise_gives_values_and_their_derivatives(batch):
     np.testing.assert_allclose(values[:, 0], u[:, 0] * decay + u[:, 2], rtol=1e-12)
     expected = np.stack([decay, -0.7 * u[:, 0] * decay, np.ones(batch)], axis=-1)
     np.testing.assert_allclose(jacobian[:, 0], expected, rtol=1e-12)
+
+
+def test_lanes_that_share_out_their_points_reach_the_same(noisy_exponentials, monkeypatch):
+    """Slices of points and lanes for parts of them: the sums are the same but for rounding."""
+    from pbrdf.inversion import solver
+
+    x, y = noisy_exponentials
+    start, wide = np.tile([1.0, 1.0, 0.0], (5, 1)), (np.full(3, -10.0), np.full(3, 10.0))
+    penalty = lambda u: [(1, (u[1] - 1.2) / 0.05, 1.0 / 0.05)]  # noqa: E731
+    problem = exponential_problem(y[:5], x)
+    problem = Residuals(problem.function, problem.points, penalty=penalty, order=np.arange(25)[::-1])
+    alone = solve(problem, start, *wide)
+    monkeypatch.setattr(solver, "SLICE", 40)  # 8 points of each lane in a launch
+    monkeypatch.setattr(solver, "WIDTH", 15)  # shared by 3
+    shared = solve(problem, start, *wide)
+    assert shared.converged.all()
+    np.testing.assert_allclose(shared.u, alone.u, rtol=1e-7)
+    np.testing.assert_allclose(shared.cost, alone.cost, rtol=1e-12)
+    np.testing.assert_allclose(shared.information, alone.information, rtol=1e-7)
+
+
+def test_an_unknown_without_influence_neither_moves_nor_stops_the_others():
+    """r = (u0 − 1, 1e-14 u1): the second column is rounding; a step by it would go from bound to bound."""
+
+    def function(u, lane, point):
+        return [u[0] - 1.0, 1e-14 * u[1] + 2.0], None
+
+    solution = solve(
+        Residuals(function, 1), np.array([[3.0, 0.5], [-1.0, 0.2]]), np.full(2, -5.0), np.full(2, 5.0)
+    )
+    assert solution.converged.all()
+    np.testing.assert_allclose(solution.u, [[1.0, 0.5], [1.0, 0.2]], atol=1e-7)
+
+
+def test_a_kink_is_a_minimum_though_its_gradient_does_not_vanish():
+    """r = |u| + 1: the step from 0 promises what it never keeps; the lane stops soon, and stalled."""
+
+    def function(u, lane, point):
+        return [dr.abs(u[0]) + 1.0], None
+
+    solution = solve(Residuals(function, 1), np.array([[0.7], [-0.4]]), np.array([-2.0]), np.array([2.0]))
+    assert (solution.iterations < 70).all()
+    assert np.abs(solution.u).max() < 1e-6
+    assert solution.best() in (0, 1)

@@ -53,6 +53,7 @@ def case(
         std_known=std is not None,
         estimates=estimates or {},
         goodness=SimpleNamespace(reduced_chi2=float((z**2).mean())),
+        settled=True,
     )
 
 

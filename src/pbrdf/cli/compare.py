@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from pbrdf.cli.command_line import command_line
-from pbrdf.cli.console import output_console, stage_bar
+from pbrdf.cli.console import NOT_CONVERGED, output_console, stage_bar
 from pbrdf.cli.options import (
     Backend,
     data_argument,
@@ -89,6 +89,8 @@ def compare(
     assumption costs, and where the best one fails. Writes a folder with a page (index.html: open it in a
     browser), summary.txt, comparison.csv, comparison.json (all numbers), best-model.json, curves.png and ranking.png.
 
+    Exit code 3: the fit of the best has not converged, its numbers are no result.
+
     With bundled data: `pbrdf compare matte-white-thick --models double-gauss`
 
     With your own: `pbrdf compare paint.csv --wavelength 550 --hold-out theta_i=50`
@@ -137,7 +139,9 @@ def compare(
     written = write_comparison(report, folder, figure_format=figure_format if figures else None)
     if quiet:
         print(folder)
-        return
-    console = output_console()
-    print_summary(report, console)
-    console.print(f"\nWritten to {folder}/: {', '.join(path.name for path in written)}", markup=False)
+    else:
+        console = output_console()
+        print_summary(report, console)
+        console.print(f"\nWritten to {folder}/: {', '.join(path.name for path in written)}", markup=False)
+    if not comparison.best.result.settled:
+        raise typer.Exit(NOT_CONVERGED)

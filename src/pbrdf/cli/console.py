@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import sys
+import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
@@ -10,7 +12,10 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from rich.console import Console
 
-__all__ = ["fail", "output_console", "progress_bar", "reading_width", "stage_bar", "warn"]
+__all__ = ["NOT_CONVERGED", "fail", "output_console", "progress_bar", "reading_width", "stage_bar", "warn"]
+
+#: Exit code of a command whose fit has not converged: everything is written, but its numbers are no result.
+NOT_CONVERGED = 3
 
 #: Lines longer than this are hard to read, however wide the terminal is.
 _WIDEST = 110
@@ -42,9 +47,13 @@ def warn(message: str) -> None:
     print(f"pbrdf: {message}", file=sys.stderr)
 
 
+#: Where standard error is no terminal, a line of progress comes after so many seconds, and again after as many.
+_EVERY = 10.0
+
+
 @contextmanager
 def progress_bar(what: str, quiet: bool = False) -> Iterator[Callable[[int, int], None]]:
-    """A progress bar on standard error, seen only if that is a terminal, gone when the work is done.
+    """A progress bar on standard error, gone when the work is done; a line now and then if that is no terminal.
 
     Yields
     ------
@@ -69,12 +78,16 @@ def stage_bar(quiet: bool = False, first: str = "") -> Iterator[Callable[[str, i
     Yields
     ------
     callable
-        To be called with the name of the stage, the number of its finished pieces and of all.
+        To be called with the name of the stage, the number of its finished pieces and of all, 0 if that is not known.
     """
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
     console = Console(stderr=True)
+    if not quiet and not console.is_terminal:
+        with _lines_now_and_then(first) as show:
+            yield show
+        return
     with Progress(
         TextColumn("{task.description}"),
         BarColumn(),
@@ -82,9 +95,31 @@ def stage_bar(quiet: bool = False, first: str = "") -> Iterator[Callable[[str, i
         TimeElapsedColumn(),
         console=console,
         transient=True,
-        disable=quiet or not console.is_terminal,
+        disable=quiet,
     ) as progress:
         task = progress.add_task(first, total=None)
         yield lambda stage, finished, total: progress.update(
-            task, description=stage, completed=finished, total=total
+            task, description=stage, completed=finished, total=total or None
         )
+
+
+@contextmanager
+def _lines_now_and_then(first: str) -> Iterator[Callable[[str, int, int], None]]:
+    """Lines that tell how far long work is: from a thread, as the work itself may be silent for long."""
+    began, over = time.monotonic(), threading.Event()
+    state = [first, ""]
+
+    def show(stage: str, finished: int, total: int) -> None:
+        state[:] = [stage, f": {finished} of {total}" if total else ""]
+
+    def tell() -> None:
+        while not over.wait(_EVERY):
+            warn(f"{state[0]}{state[1]} ({time.monotonic() - began:.0f} s)")
+
+    teller = threading.Thread(target=tell, name="progress", daemon=True)
+    teller.start()
+    try:
+        yield show
+    finally:
+        over.set()
+        teller.join()

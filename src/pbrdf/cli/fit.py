@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from pbrdf.cli.command_line import command_line
-from pbrdf.cli.console import output_console, progress_bar
+from pbrdf.cli.console import NOT_CONVERGED, output_console, stage_bar
 from pbrdf.cli.options import (
     Backend,
     noise_option,
@@ -66,6 +67,7 @@ def fit(
         typer.Option(help="Value where every start begins, e.g. n=1.6 (repeatable).", metavar="NAME=VALUE"),
     ] = None,
     starts: Annotated[int, typer.Option(help="Number of starts, spread over the bounds.")] = 64,
+    iterations: Annotated[int, typer.Option(help="Steps of each start at most.", min=1)] = 100,
     noise: Annotated[
         str | None,
         noise_option(
@@ -170,6 +172,8 @@ def fit(
     comparison.nc (measured, modelled, residual), fit.nc (for pbrdf.load_fit) and the figures: figure.png, starts.png,
     polarisation.png and hemisphere.png where there is such data, contours.png with --contour.
 
+    Exit code 3: a fit has not converged, its numbers are no result.
+
     With bundled data: `pbrdf fit matte-white-thick --hold-out group=3`
 
     With your own: `pbrdf fit paint.csv --column I=f_r_per_sr --noise 3%,1% --fix n=1.5`
@@ -188,6 +192,7 @@ def fit(
         "bounds": read_bounds(bounds or (), "--bounds", "sigma=0.01:0.2"),
         "start": numbers(start or (), "--start", "n=1.6"),
         "starts": starts,
+        "max_iterations": iterations,
         "noise": noise,
         "hold_out": hold_out,
         "strategy": strategy,
@@ -214,11 +219,14 @@ def fit(
 
     from pbrdf.inversion import fit as fit_dataset
 
+    unsettled = False
     for file, folder in zip(files, folders, strict=True):
         dataset = reading.open(file)
         try:
-            with progress_bar(f"Fitting {file}", quiet) as progress:
+            with stage_bar(quiet, f"Fitting {file}") as show:
+                progress = functools.partial(show, f"Fitting {file}")
                 result = fit_dataset(dataset, chosen, progress=progress, **arguments)
+                show(f"Looking at the fit of {file}", 0, 0)
                 checks = run_checks(
                     result,
                     dataset,
@@ -239,6 +247,7 @@ def fit(
             result, dataset, file, settings, checks, command=command_line(), sha256=sha256_of(Path(file))
         )
         written = write_report(report, folder, figure_format=figure_format, figures=figures)
+        unsettled |= not result.settled
         if quiet:
             print(folder)
             continue
@@ -247,6 +256,8 @@ def fit(
         console = output_console()
         print_summary(report, console, verbose=verbose)
         console.print(f"\nWritten to {folder}/: {', '.join(path.name for path in written)}", markup=False)
+    if unsettled:
+        raise typer.Exit(NOT_CONVERGED)
 
 
 def _prior(name: str, text: str) -> tuple[float, float]:

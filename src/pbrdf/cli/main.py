@@ -25,6 +25,7 @@ from pbrdf.cli.convert import convert
 from pbrdf.cli.doctor import doctor
 from pbrdf.cli.export import export
 from pbrdf.cli.fit import fit
+from pbrdf.cli.interrupt import INTERRUPTED, end, heard_at_once
 from pbrdf.cli.lists import models, paints
 from pbrdf.cli.measure import measure
 from pbrdf.cli.options import ReadingCommand
@@ -55,6 +56,9 @@ class _Commands(TyperGroup):
         try:
             with _plugin_warnings_in_lines():
                 return super().invoke(ctx)
+        except KeyboardInterrupt:
+            fail("interrupted")
+            raise typer.Exit(INTERRUPTED) from None
         except PbrdfError as error:
             fail(str(error))
         except OSError as error:
@@ -152,4 +156,15 @@ def main() -> None:
         # An old Windows code page has no σ or χ: better a question mark than a crash.
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")
-    app()
+    with heard_at_once() as heard:
+        try:
+            app()
+        except SystemExit as leaving:
+            if leaving.code == INTERRUPTED:
+                end()
+            raise
+        except Exception:
+            if not heard.is_set():
+                raise
+            fail("interrupted")
+            end()

@@ -42,7 +42,7 @@ _FOUND = 0.02
 _GEOMETRIES, _STARTS = 120, 8
 #: Zenith angles below this many radians, all of them, may be degrees of radians.
 _SMALL = math.radians(math.pi)
-_BETTER = {Level.DOES_NOT: 0, Level.IN_PART: 1, Level.DESCRIBES: 2}
+_BETTER = {Level.NOT_CONVERGED: -1, Level.DOES_NOT: 0, Level.IN_PART: 1, Level.DESCRIBES: 2}
 _Change = Callable[["xr.Dataset"], "xr.Dataset"]
 #: Whether the convention was stated, the option, words after "the data fit better", the change.
 _Reading = tuple[bool, str, str, _Change]

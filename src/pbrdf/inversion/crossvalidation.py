@@ -22,6 +22,7 @@ from pbrdf.inversion.observations import Observations
 from pbrdf.inversion.problem import Space, residuals
 from pbrdf.inversion.result import FitResult
 from pbrdf.inversion.solver import Solution, Status, solve
+from pbrdf.inversion.thinning import draw
 from pbrdf.models import DoubleGauss, Model
 
 if TYPE_CHECKING:
@@ -131,7 +132,7 @@ class CrossValidation:
                 )
         failed = [f.label for f in self.folds if not f.converged]
         if failed:
-            lines.append(f"Not converged: {', '.join(failed)}; raise max_iterations or starts.")
+            lines.append(f"Not converged: {', '.join(failed)}; try more starts.")
         return lines
 
 
@@ -223,10 +224,13 @@ def _search(
     """Best solution of each fold, and how many starts reached it, shape (K,).
 
     All folds are searched from all starts in one batch with the draft accuracy: lane l is start l % starts of
-    fold l // starts. The best end of each is refined with the model's own accuracy.
+    fold l // starts. The best end of each is refined with the model's own accuracy. Of many geometries a part is
+    searched (:mod:`pbrdf.inversion.thinning`), the same in every fold.
     """
     space = full.space
     low, high = space.box
+    part = draw(space, full.data)
+    whole, data = data, data if part is None else [part.of(fold) for fold in data]
     begin = np.concatenate([full.unknowns[None], space.to_unknowns(full.start_values)])[:starts]
     search = solve(
         residuals(space, data, starts, accuracy="draft"),
@@ -240,7 +244,7 @@ def _search(
     cost = np.where(np.isfinite(search.cost), search.cost, np.inf).reshape(len(data), starts)
     reached = (cost <= cost.min(axis=1, keepdims=True) * (1.0 + SAME_OPTIMUM)).sum(axis=1)
     best = np.arange(len(data)) * starts + cost.argmin(axis=1)
-    refined = solve(residuals(space, data), search.u[best], low, high, max_iterations=max_iterations)
+    refined = solve(residuals(space, whole), search.u[best], low, high, max_iterations=max_iterations)
     return refined, reached
 
 

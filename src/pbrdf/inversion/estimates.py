@@ -33,7 +33,7 @@ class Estimate:
         Bounds that the fit kept.
     verdict
         ``"determined"``, ``"undetermined"`` (the data tell no more than the bounds), ``"at lower bound"``,
-        ``"at upper bound"`` or ``"fixed"``.
+        ``"at upper bound"``, ``"fixed"``, or ``"not converged"`` where the fit stands at no minimum.
     """
 
     parameter: Parameter
@@ -103,7 +103,9 @@ def estimates_at(
     }
     for i, p in enumerate(space.free):
         std = float(error[i] * slope[i])
-        if at_low[i]:
+        if not solution.converged[best]:
+            verdict, std = "not converged", math.nan
+        elif at_low[i]:
             verdict, std = "at lower bound", math.nan
         elif at_high[i]:
             verdict, std = "at upper bound", math.nan
@@ -123,10 +125,11 @@ def estimates_at(
     return estimates, ([space.names[i] for i in inside], correlation)
 
 
-def distinct_optima(space: Space, solution: Solution) -> list[DistinctOptimum]:
-    """Ends of the starts that converged, those that agree taken together, the best first."""
+def distinct_optima(space: Space, solution: Solution, best: int) -> list[DistinctOptimum]:
+    """Ends of the starts that converged, and that of the lane ``best``; those that agree together, the best first."""
     low, high = space.box
     cost = np.where(solution.converged, solution.cost, np.inf)
+    cost[best] = solution.cost[best]
     return [
         DistinctOptimum(
             dict(zip(space.names, map(float, space.to_parameters(solution.u[members[0]])), strict=True)),

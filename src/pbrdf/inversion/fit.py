@@ -156,6 +156,13 @@ def fit(
             f"{fitted_data.count} measured values cannot determine {len(space.free)} parameters: measure "
             "more, hold out less, or fix parameters"
         )
+    places, distinct = fitted_data.distinct(space.labels("group") != [], space.labels("wavelength") != [])
+    if distinct < len(space.free):
+        raise FitError(
+            f"{fitted_data.count} values at {places} {'geometry' if places == 1 else 'different geometries'} cannot "
+            f"determine {len(space.free)} parameters, as repeated readings tell no more of them than "
+            f"{'one does' if places == 1 else 'one at each does'}: measure in more directions, or fix parameters"
+        )
     low, high = space.box
     first = sobol_starts(low, high, starts, seed)
     first = first[np.argsort(first[:, 0])]  # neighbours alike: they then take the same branches
@@ -180,6 +187,11 @@ def fit(
         dataset, observations, fitted_data, held, space, solution, first, words, hold_out, seconds
     )
     result.stages.extend(stages)
+    if stages[0].name == "search":
+        result.notes.append(
+            f"The starts searched {stages[0].points} of the {stages[-1].points} geometries, drawn evenly over the "
+            "directions; what they found best was refined on all, and its χ² and errors are those of all."
+        )
     if diffuse is not None:
         result.comparison["used_for_diffuse"] = ("geometry", diffuse)
     return result
@@ -199,7 +211,7 @@ def _summarise(
 ) -> FitResult:
     import xarray as xr
 
-    best = int(np.nanargmin(np.where(np.isfinite(solution.cost), solution.cost, np.nan)))
+    best = solution.best()
     values = space.to_parameters(solution.u[best])
     values = np.clip(values, space.lower, space.upper)
     model = space.build(values)
@@ -220,7 +232,7 @@ def _summarise(
         fitted_data.std_known,
     )
     estimates, correlation = estimates_at(space, values, solution, best, fitted_data, quality)
-    optima = distinct_optima(space, solution)
+    optima = distinct_optima(space, solution, best)
     regions = {"all": np.ones_like(held), "near-specular": near, "off-specular": ~near}
 
     def by_region(chosen: np.ndarray) -> dict[str, Prediction]:
@@ -252,6 +264,7 @@ def _summarise(
         data=fitted_data,
         unknowns=solution.u[best],
         information=solution.information[best],
+        settled=bool(solution.converged[best]),
         start_values=space.to_parameters(first),
         end_values=space.to_parameters(solution.u),
         chi2_by_start=2.0 * solution.cost,

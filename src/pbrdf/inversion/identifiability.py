@@ -24,7 +24,7 @@ import numpy as np
 from pbrdf.inversion.optimum import Optimum
 from pbrdf.inversion.refits import Optima
 from pbrdf.inversion.statistics import covariance, prior_spread
-from pbrdf.inversion.verdict import Level, verdict
+from pbrdf.inversion.verdict import verdict
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -89,6 +89,8 @@ class Identifiability:
         Not determined or traded off, the worst first.
     described
         Whether the model describes the data at all; if not, no sentence says that they determine anything.
+    settled
+        Whether the fit has converged; if not, the same.
     """
 
     eigenvalues: np.ndarray
@@ -98,10 +100,13 @@ class Identifiability:
     at_bound: list[str]
     combinations: list[Combination] = field(default_factory=list)
     described: bool = True
+    settled: bool = True
 
     @property
     def sentences(self) -> list[str]:
         """The findings in words."""
+        if not self.settled:
+            return ["Nothing can be said of what the data determine, as the fit has not converged."]
         if not self.described:
             return ["Nothing can be said of what the data determine, as the model does not describe them."]
         found = [combination.sentence for combination in self.combinations]
@@ -135,7 +140,7 @@ def identifiability(result: Optimum, *, described: bool | None = None) -> Identi
     import xarray as xr
 
     if described is None:
-        described = verdict(result).level != Level.DOES_NOT
+        described = verdict(result).level.usable
 
     optima = Optima.of(result)
     space = result.space
@@ -190,6 +195,7 @@ def identifiability(result: Optimum, *, described: bool | None = None) -> Identi
         [space.names[i] for i in np.flatnonzero(optima.at_bound[0])],
         combinations,
         described,
+        result.settled,
     )
 
 

@@ -188,6 +188,11 @@ class Comparison:
 
     def _verdict(self) -> list[str]:
         best = self.best
+        if not best.result.settled:
+            return [
+                f"The fit of {best.name}, which predicts best, has not converged: its numbers are no result; try more "
+                "--starts."
+            ]
         missed = f"it misses what it has not seen by {_error(best.score, best.uncertainty)} ({self.score_in_words})"
         if best.score <= DESCRIBES:
             return [f"{best.name} predicts best: {missed}."]
@@ -561,8 +566,8 @@ def _remarks(f: _Fitted, leads: bool, behind: Paired) -> list[str]:
         remarks.append("best")
     elif not behind.apart:
         remarks.append("not told apart")
-    if not f.result.converged:
-        remarks.append("no start converged")
+    if not f.result.settled:
+        remarks.append("not converged")
     if f.bad_folds:
         remarks.append(f"not converged without {', '.join(f.bad_folds)}")
     on_bounds = [name for name, e in f.result.estimates.items() if _on_bound(e)]

@@ -30,11 +30,8 @@ def notes_on(
                 f"One set of parameters was fitted to {len(wavelengths)} wavelengths at once; select one, or let "
                 f"{amplitude} be free for each, if the colour of the coating matters."
             )
-    if not solution.converged[best]:
-        notes.append(
-            f"The best start did not converge ({Status(solution.status[best]).name.lower()}); raise the number "
-            "of iterations or of starts."
-        )
+    if not result.settled:
+        notes.append(_not_converged(Status(solution.status[best])))
     undetermined = [n for n, e in result.estimates.items() if e.verdict == "undetermined"]
     if undetermined:
         notes.append(
@@ -60,9 +57,18 @@ def notes_on(
             f"{len(rivals)} other optimum(s) fit nearly as well (χ² within 4): the solution is not unique."
         )
     reduced = result.goodness.reduced_chi2
-    if data.std_known and reduced > 2.0:
+    if data.std_known and reduced > 2.0 and result.settled:
         notes.append(
             f"Reduced χ² is {reduced:.3g}: the model departs from the data by more than their stated uncertainty, and "
             f"the standard errors are too small by a factor of about {reduced**0.5:.2g}."
         )
     return notes
+
+
+def _not_converged(status: Status) -> str:
+    if status == Status.ITERATIONS:
+        return "The best start was still under way when its steps were used up: allow more with --iterations."
+    return (
+        "The best start found no way down and stands at no minimum: try more --starts, narrower --bounds, or fewer "
+        "free parameters (--fix, fewer --nuisance terms)."
+    )

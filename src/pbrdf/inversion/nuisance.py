@@ -40,7 +40,7 @@ KINDS: dict[str, Parameter] = {
         "angle", "δ", "rad", "offset of the sample's angle", -2.0 * _DEGREE, 2.0 * _DEGREE, (-1.0, 1.0), 0.0
     ),
     "source": Parameter(
-        "source", "ρ", "rad", "angular radius of the source", 0.0, 5.0 * _DEGREE, (0.0, 1.0), 0.0
+        "source", "ρ", "rad", "angular radius of the source", 0.0, 5.0 * _DEGREE, (0.0, 1.0), 0.0, even=True
     ),
 }
 _DEFAULT_PRIORS = {"angle": (0.0, 0.2 * _DEGREE)}

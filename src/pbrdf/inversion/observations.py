@@ -230,6 +230,22 @@ class Observations:
         """Number of measured values."""
         return int(np.isfinite(self.std).sum())
 
+    def distinct(self, by_group: bool = False, by_wavelength: bool = False) -> tuple[int, int]:
+        """Numbers of different geometries, and of different values of a model there: one for each measured channel.
+
+        Groups and wavelengths make a difference where the model has parameters of its own for them.
+        """
+        measured = np.isfinite(self.std)
+        used = measured.any(axis=0)
+        phi = np.mod(self.phi, 2.0 * np.pi)
+        columns = [np.round(angle[used], 9) for angle in (self.theta_i, self.theta_r, phi)]
+        for wanted, column in ((by_group, self.group), (by_wavelength, self.wavelength)):
+            if wanted and column is not None:
+                columns.append(np.unique(column[used], return_inverse=True)[1].astype(float))
+        places, number = np.unique(np.stack(columns, axis=1), axis=0, return_inverse=True)
+        values = [len(np.unique(number.ravel()[channel])) for channel in measured[:, used]]
+        return len(places), sum(values)
+
     @property
     def polarised(self) -> bool:
         """Whether any channel carries polarisation."""

@@ -41,6 +41,8 @@ class Optimum:
         The free parameters and the fitted observations.
     unknowns, information
         The solver's unknowns at the optimum, shape (P,), and JᵀJ there, shape (P, P).
+    settled
+        Whether the fit has converged: it stands at a minimum of χ².
     """
 
     model: Model
@@ -51,6 +53,7 @@ class Optimum:
     data: Observations = field(repr=False)
     unknowns: np.ndarray = field(repr=False)
     information: np.ndarray = field(repr=False)
+    settled: bool = True
 
     @property
     def std_known(self) -> bool:

@@ -18,6 +18,9 @@ from pbrdf.models.parameters import Parameter
 
 __all__ = ["Space", "Term", "derivatives", "predict", "residuals"]
 
+#: What an even parameter is at least where derivatives are taken, which at 0 would be 0/0: far below what matters.
+_POINT = 1e-6
+
 
 @dataclass(frozen=True)
 class Term:
@@ -48,7 +51,7 @@ class Term:
 class Space:
     """The free parameters of a fit, and the way between them and the solver's unknowns.
 
-    The unknown of a logarithmic parameter is its logarithm, else the parameter itself.
+    The unknown of a logarithmic parameter is its logarithm, that of an even one its square, else the parameter itself.
 
     Attributes
     ----------
@@ -93,6 +96,8 @@ class Space:
         for i, p in enumerate(self.free):
             if p.logarithmic:
                 result[..., i] = np.log(result[..., i])
+            elif p.even:
+                result[..., i] = result[..., i] ** 2
         return result
 
     def to_parameters(self, unknowns: np.ndarray) -> np.ndarray:
@@ -101,6 +106,8 @@ class Space:
         for i, p in enumerate(self.free):
             if p.logarithmic:
                 result[..., i] = np.exp(result[..., i])
+            elif p.even:
+                result[..., i] = np.sqrt(np.maximum(result[..., i], 0.0))
         return result
 
     @property
@@ -114,6 +121,8 @@ class Space:
         for i, p in enumerate(self.free):
             if p.logarithmic:
                 result[..., i] = values[..., i]
+            elif p.even:
+                result[..., i] = 0.5 / np.maximum(values[..., i], _POINT)
         return result
 
     def build(self, values: Sequence[float] | np.ndarray, label: Any = None) -> Model:
@@ -208,7 +217,9 @@ def residuals(
         ]
         return weighted, alive
 
-    return Residuals(function, points, _penalty(space), space.loss)
+    # grazing geometries take more work: side by side with their like
+    order = np.argsort(np.maximum(first.theta_i, first.theta_r), kind="stable")
+    return Residuals(function, points, _penalty(space), space.loss, order)
 
 
 def predict(
@@ -329,18 +340,17 @@ class _Signals:
         shared: dict[tuple[bool, str], list[Any]] = {}
         for term, unknown in zip(self.space.terms, u, strict=True):
             shared.setdefault((term.nuisance, term.role), []).append(unknown)
-        logarithmic = {
-            (term.nuisance, term.role): p.logarithmic
-            for term, p in zip(self.space.terms, self.space.free, strict=True)
+        parameters = {
+            (term.nuisance, term.role): p for term, p in zip(self.space.terms, self.space.free, strict=True)
         }
         for (nuisance, role), unknowns in shared.items():
             # a group or wavelength without an unknown of its own (held out) gets the mean of the others
             mean = sum(unknowns[1:], unknowns[0]) / len(unknowns) if len(unknowns) > 1 else unknowns[0]
             target = nuisances if nuisance else values
-            target[role] = dr.exp(mean) if logarithmic[nuisance, role] else mean
+            target[role] = _value(parameters[nuisance, role], mean)
         for term, unknown in zip(self.space.terms, u, strict=True):
             if term.split is not None:
-                value = dr.exp(unknown) if logarithmic[term.nuisance, term.role] else unknown
+                value = _value(parameters[term.nuisance, term.role], unknown)
                 index = dr.gather(self.UInt32, self.label_index[term.split], point)
                 chosen = index == self.space.labels(term.split).index(term.label)
                 target = nuisances if term.nuisance else values
@@ -353,6 +363,15 @@ class _Signals:
         if "dark" in nuisances:
             dark = nuisances["dark"] * dr.gather(self.Float, self.scale, point)
         return channel_values(f, channels, self.incident, nuisances.get("gain"), dark), (alive, f)
+
+
+def _value(p: Parameter, unknown: Any) -> Any:
+    """A parameter from the solver's unknown, a Dr.Jit float."""
+    import drjit as dr
+
+    if p.logarithmic:
+        return dr.exp(unknown)
+    return dr.sqrt(unknown + _POINT * _POINT) if p.even else unknown
 
 
 def _label_index(data: Observations, split: str, labels: list[Any]) -> np.ndarray:
@@ -369,14 +388,18 @@ def _penalty(space: Space) -> Any:
         return None
 
     def penalty(u: list[Any]) -> list[tuple[int, Any, Any]]:
-        import drjit as dr
 
         found = []
         for i, (term, p) in enumerate(zip(space.terms, space.free, strict=True)):
             if term.prior is not None:
                 mean, weight = term.prior[0], 1.0 / term.prior[1]
-                value = dr.exp(u[i]) if p.logarithmic else u[i]
-                found.append((i, (value - mean) * weight, value * weight if p.logarithmic else weight))
+                value = _value(p, u[i])
+                slope: Any = 1.0
+                if p.logarithmic:
+                    slope = value
+                elif p.even:
+                    slope = 0.5 / value
+                found.append((i, (value - mean) * weight, slope * weight))
         return found
 
     return penalty

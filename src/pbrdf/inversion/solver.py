@@ -6,6 +6,10 @@ residuals and their exact derivatives (forward mode) at the trial point inside a
 geometries, and accepts or rejects. Lanes that have converged leave the batch. The kernel is compiled once,
 whatever the number of lanes, geometries, parameter values or bounds.
 
+Few lanes over many points ("wide") would leave most of the processor idle and run for minutes in one kernel: there an
+iteration is several kernels, the points of a lane are dealt out to lanes of their own, a slice of them at a time, and
+their sums are added up. Between kernels Python is heard, so a fit can be interrupted.
+
 The method is Levenberg-Marquardt with Marquardt's scaling, the damping update of Nielsen (1999) and
 projection onto the bounds with an active set (compare Kanzow, Yamashita and Fukushima, J. Comput. Appl. Math.
 172, 375 (2004)): unknowns that a step would carry across a bound are put on it and the step of the others is
@@ -26,11 +30,21 @@ from pbrdf.backend import get_backend
 __all__ = ["LOSSES", "Residuals", "Solution", "Status", "linearise", "solve"]
 
 #: Iterations of one kernel launch, after which stopped lanes leave the batch. A batch of at most SMALL_BATCH
-#: lanes runs to its end in one launch: recording the kernel anew would take longer than idle lanes do.
-ROUNDS, SMALL_BATCH = 6, 1024
+#: lanes runs for as many as make LAUNCH evaluations: recording the kernel anew would take longer than idle lanes do.
+ROUNDS, SMALL_BATCH, LAUNCH = 6, 1024, 1 << 18
+#: Up to SMALL_BATCH lanes that make more than SLICE evaluations in an iteration are wide: SLICE evaluations a launch
+#: (about a second of one core), shared by about WIDTH lanes.
+SLICE, WIDTH = 1 << 16, 2048
 
 #: How often a step is solved again with the unknowns that would cross a bound held on it.
 BOUND_PASSES = 2
+#: An unknown whose whole range changes the residuals by less than this part of them has no influence but rounding's.
+NO_INFLUENCE = 1e-10
+#: A lane stalls that gains no more than this part of the cost in so many steps: kinks of a model make it creep.
+CREEPING, PATIENCE = 1e-8, 12
+#: A lane that stalled stands at a minimum, but for rounding and kinks, if no more than this part of the cost is left to
+#: gain: with χ² about 100, far less than tells one set of parameters from another.
+NOTHING_TO_GAIN = 1e-6
 
 
 #: What is evaluated: unknowns, lane and point to values and whatever was computed on the way.
@@ -101,12 +115,16 @@ class Residuals:
         priors. They are not subject to the loss.
     loss
         ρ: one of ``LOSSES``; r is in standard deviations, so a loss departs from squares at about 1.
+    order
+        The points such that neighbours take the same branches, shape (points,): neighbours are computed side by side
+        where lanes share out their points. None for as they are.
     """
 
     function: Function
     points: int
     penalty: Callable[[list[Any]], list[tuple[int, Any, Any]]] | None = None
     loss: str = "linear"
+    order: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -140,6 +158,12 @@ class Solution:
     def converged(self) -> np.ndarray:
         """Mask of the lanes that stand at a minimum, shape (B,)."""
         return np.isin(self.status, [s for s in Status if s.converged])
+
+    def best(self) -> int:
+        """Number of the lane of the lowest cost: among those as low but for rounding, one at a minimum."""
+        cost = np.where(np.isfinite(self.cost), self.cost, np.inf)
+        as_low = np.flatnonzero(cost <= cost.min() * (1.0 + NOTHING_TO_GAIN))
+        return int(min(as_low, key=lambda lane: (not self.converged[lane], cost[lane])))
 
 
 def solve(
@@ -190,7 +214,8 @@ def solve(
     small = dr.opaque(Float, tolerance)
     while len(lanes):
         active = backend.upload(UInt32, lanes)
-        state = _iterations(residuals, state, active, small, limit)
+        wide = len(lanes) <= SMALL_BATCH and len(lanes) * residuals.points > SLICE
+        state = (_wide_iteration if wide else _iterations)(residuals, state, active, small, limit)
         status = state.status.numpy()
         done = status != Status.RUNNING
         if done.any():
@@ -203,7 +228,9 @@ def solve(
                 state = state.gather(backend.upload(UInt32, rest))
         if progress is not None:
             progress(max(batch - len(lanes), 0), batch)
-    return result.solution()
+    solution = result.solution()
+    solution.status[_nothing_to_gain(solution, lower, upper)] = Status.SMALL_REDUCTION
+    return solution
 
 
 def linearise(function: Function, u: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:
@@ -267,6 +294,7 @@ class _State:
     growth: Any
     status: Any
     iterations: Any
+    slow: Any
 
     @classmethod
     def initial(cls, backend: Any, start: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> _State:
@@ -293,6 +321,7 @@ class _State:
             growth=full(2.0),
             status=dr.opaque(backend.UInt32, 0, batch),
             iterations=dr.opaque(backend.UInt32, 0, batch),
+            slow=dr.opaque(backend.UInt32, 0, batch),
         )
 
     def gather(self, index: Any) -> _State:
@@ -348,7 +377,8 @@ def _iterations(
     import drjit as dr
 
     UInt32 = type(lane)
-    rounds = dr.opaque(UInt32, ROUNDS if len(lane) > SMALL_BATCH else 1 << 30)
+    many = max(ROUNDS, LAUNCH // (len(lane) * residuals.points))
+    rounds = dr.opaque(UInt32, ROUNDS if len(lane) > SMALL_BATCH else many)
 
     def body(count: Any, state: _State, lane: Any, *fixed: Any) -> tuple[Any, ...]:
         return count + 1, _iterate(residuals, state, lane, *fixed), lane, *fixed
@@ -372,11 +402,35 @@ def _iterate(
     limit: Any,
 ) -> _State:
     """One step of every lane."""
+    trial, predicted = _propose(state)
+    return _judge(state, trial, predicted, _normal_equations(residuals, trial, lane), tolerance, limit)
+
+
+def _wide_iteration(residuals: Residuals, state: _State, lane: Any, tolerance: Any, limit: Any) -> _State:
+    """One step of every lane, where the lanes are few and the points many."""
+    import drjit as dr
+
+    trial, predicted = _propose(state)
+    dr.eval(trial, predicted)
+    state = _judge(state, trial, predicted, _wide_normal_equations(residuals, trial, lane), tolerance, limit)
+    dr.eval(state)
+    return state
+
+
+def _propose(state: _State) -> tuple[list[Any], Any]:
+    """Where every lane goes next, and the reduction of the cost that the quadratic model promises there."""
     import drjit as dr
 
     u, g, size, low, high = state.u, state.g, len(state.u), state.low, state.high
     A = _unpack(state.A, size)
-    step = _bounded_step(A, g, state.damping, u, low, high)
+    # where a derivative is nothing but rounding, as that by the radius of a source at 0, so would be its step
+    least = [
+        dr.select(dr.isfinite(state.cost), NO_INFLUENCE**2 * state.cost, 0.0)
+        / dr.maximum((b - a) * (b - a), 1e-300)
+        for a, b in zip(low, high, strict=True)
+    ]
+    idle = [A[i][i] <= least[i] for i in range(size)]
+    step = _bounded_step(A, g, state.damping, u, low, high, idle)
     trial = [dr.clip(u[i] + step[i], low[i], high[i]) for i in range(size)]
     delta = [trial[i] - u[i] for i in range(size)]
     # −(gᵀδ + ½ δᵀAδ), the reduction that the quadratic model promises for the projected step
@@ -384,8 +438,24 @@ def _iterate(
         delta[i] * (g[i] + 0.5 * sum(A[max(i, j)][min(i, j)] * delta[j] for j in range(size)))
         for i in range(size)
     )
+    return trial, predicted
 
-    cost, packed, gradient = _normal_equations(residuals, trial, lane)
+
+def _judge(
+    state: _State,
+    trial: list[Any],
+    predicted: Any,
+    evaluated: tuple[Any, list[Any], list[Any]],
+    tolerance: Any,
+    limit: Any,
+) -> _State:
+    """Accept or reject what every lane tried, and see whether it is done."""
+    import drjit as dr
+
+    u, g, size, low, high = state.u, state.g, len(state.u), state.low, state.high
+    A = _unpack(state.A, size)
+    delta = [trial[i] - u[i] for i in range(size)]
+    cost, packed, gradient = evaluated
     first = ~dr.isfinite(state.cost)
     finite = dr.isfinite(cost)
     accepted = finite & (((cost < state.cost) & (predicted > 0.0)) | first)
@@ -402,20 +472,26 @@ def _iterate(
     length = dr.zeros(type(cost), 1)
     leaving = _leaving(g, u, low, high)
     slope2 = dr.zeros(type(cost), 1)  # largest squared cosine between the residuals and a column of J
+    length_of_box = dr.zeros(type(cost), 1)
     for i in range(size):
+        length_of_box = dr.maximum(length_of_box, high[i] - low[i])
         length = dr.maximum(length, dr.abs(delta[i]) / dr.maximum(high[i] - low[i], 1e-300))
         cosine2 = g[i] * g[i] / dr.maximum(2.0 * A[i][i] * state.cost, 1e-300)
         slope2 = dr.maximum(slope2, dr.select(leaving[i], 0.0, cosine2))
     free = state.damping <= 1.0
     U = type(state.status)
-    status = dr.select(state.damping > 1e12, U(int(Status.STALLED)), U(0))
+    slow = dr.select(state.cost - cost > CREEPING * state.cost, U(0), state.slow + 1)
+    status = dr.select((state.damping > 1e12) | (slow >= PATIENCE), U(int(Status.STALLED)), U(0))
     # below some 1e-15 of the cost a reduction cannot be told from rounding
     small = (predicted >= 0.0) & (predicted <= dr.maximum(tolerance * tolerance, 4e-15) * state.cost)
     status = dr.select(free & small, U(int(Status.SMALL_REDUCTION)), status)
     status = dr.select(free & (length < tolerance), U(int(Status.SMALL_STEP)), status)
     status = dr.select(slope2 <= tolerance * tolerance, U(int(Status.ZERO_GRADIENT)), status)
     status = dr.select((status == 0) & (state.iterations >= limit), U(int(Status.ITERATIONS)), status)
-    status = dr.select(first, dr.select(finite, U(0), U(int(Status.NOT_FINITE))), status)
+    # where every unknown is held there is nothing to try
+    held = length_of_box <= 0.0
+    begun = dr.select(held, U(int(Status.ZERO_GRADIENT)), U(int(Status.RUNNING)))
+    status = dr.select(first, dr.select(finite, begun, U(int(Status.NOT_FINITE))), status)
 
     def keep(new: list[Any], old: list[Any]) -> list[Any]:
         return [dr.select(accepted, a, b) for a, b in zip(new, old, strict=True)]
@@ -431,20 +507,76 @@ def _iterate(
         growth=growth,
         status=status,
         iterations=state.iterations + 1,
+        slow=dr.select(first, U(0), slow),
     )
+
+
+def _wide_normal_equations(residuals: Residuals, u: list[Any], lane: Any) -> tuple[Any, list[Any], list[Any]]:
+    """What :func:`_normal_equations` gives, the points of each lane shared out, a slice of them in a launch."""
+    import drjit as dr
+
+    Float, UInt32 = type(u[0]), type(lane)
+    points, batch = residuals.points, len(lane)
+    share = max(1, min(WIDTH // batch, points))
+    slice_ = max(SLICE // batch, share)
+    places = dr.opaque(UInt32, share)
+    order = UInt32(np.arange(points) if residuals.order is None else residuals.order)
+    number = dr.arange(UInt32, batch * share)
+    owner = number // places
+    offset = number - owner * places
+    shared_u, shared_lane = [dr.gather(Float, v, owner) for v in u], dr.gather(UInt32, lane, owner)
+    dr.eval(offset, shared_u, shared_lane)
+    total: list[Any] | None = None
+    for begin in range(0, points, slice_):
+        end = dr.opaque(UInt32, min(begin + slice_, points))
+        cost, A, g = _sums(
+            residuals, shared_u, shared_lane, offset + dr.opaque(UInt32, begin), places, end, order
+        )
+        dr.eval(cost, A, g)
+        sums = [dr.block_sum(x, share) for x in (cost, *A, *g)]
+        total = sums if total is None else [a + b for a, b in zip(total, sums, strict=True)]
+        dr.eval(total)
+        dr.sync_thread()  # here an interrupt is heard
+    assert total is not None
+    size = len(u)
+    return _with_penalty(residuals, u, total[0], total[1:-size], total[-size:])
 
 
 def _normal_equations(residuals: Residuals, u: list[Any], lane: Any) -> tuple[Any, list[Any], list[Any]]:
     """½ Σ r², the lower triangle of JᵀJ by rows, and Jᵀr, in a symbolic loop over the points."""
     import drjit as dr
 
+    UInt32 = type(lane)
+    one = dr.opaque(UInt32, 1)
+    cost, A, g = _sums(residuals, u, lane, UInt32(0), one, dr.opaque(UInt32, residuals.points), None)
+    return _with_penalty(residuals, u, cost, A, g)
+
+
+def _with_penalty(
+    residuals: Residuals, u: list[Any], cost: Any, A: list[Any], g: list[Any]
+) -> tuple[Any, list[Any], list[Any]]:
+    """The sums over the points, with the penalties added."""
+    if residuals.penalty is not None:
+        for i, r, slope in residuals.penalty(u):
+            cost = cost + 0.5 * r * r
+            diagonal = i * (i + 1) // 2 + i
+            A[diagonal] = A[diagonal] + slope * slope
+            g[i] = g[i] + slope * r
+    return cost, A, g
+
+
+def _sums(
+    residuals: Residuals, u: list[Any], lane: Any, first: Any, stride: Any, end: Any, order: Any | None
+) -> tuple[Any, list[Any], list[Any]]:
+    """½ Σ r², the lower triangle of JᵀJ by rows, and Jᵀr over the points first, first + stride, … before end."""
+    import drjit as dr
+
     size = len(u)
     Float = type(u[0])
-    UInt32 = type(lane)
-    points = dr.opaque(UInt32, residuals.points)
     triangle = [(i, j) for i in range(size) for j in range(i + 1)]
 
-    def body(point: Any, u: list[Any], lane: Any, cost: Any, A: list[Any], g: list[Any]) -> tuple[Any, ...]:
+    def body(place: Any, u: list[Any], lane: Any, cost: Any, A: list[Any], g: list[Any]) -> tuple[Any, ...]:
+        point = place if order is None else dr.gather(type(lane), order, place)
         r, J = _jacobian(residuals.function, u, lane, point)
         if residuals.loss == "linear":
             cost = cost + 0.5 * _inner(r, r)
@@ -456,25 +588,19 @@ def _normal_equations(residuals: Residuals, u: list[Any], lane: Any) -> tuple[An
             weighted = [[x * slope for x, (_, slope) in zip(column, losses, strict=True)] for column in J]
         A = [a + _inner(weighted[i], J[j]) for a, (i, j) in zip(A, triangle, strict=True)]
         g = [b + _inner(weighted[i], r) for i, b in enumerate(g)]
-        return point + 1, u, lane, cost, A, g
+        return place + stride, u, lane, cost, A, g
 
     zero = Float(0.0)
     with dr.suspend_grad():
         u = [dr.detach(v) for v in u]
     out = dr.while_loop(
-        (UInt32(0), u, lane, zero, [zero] * len(triangle), [zero] * size),
-        lambda point, *_: point < points,
+        (first, u, lane, zero, [zero] * len(triangle), [zero] * size),
+        lambda place, *_: place < end,
         body,
         mode="symbolic",
         label="points",
     )
-    cost, A, g = out[3], out[4], out[5]
-    if residuals.penalty is not None:
-        for i, r, slope in residuals.penalty(u):
-            cost = cost + 0.5 * r * r
-            A[triangle.index((i, i))] = A[triangle.index((i, i))] + slope * slope
-            g[i] = g[i] + slope * r
-    return cost, A, g
+    return out[3], list(out[4]), list(out[5])
 
 
 def _jacobian(function: Function, u: list[Any], lane: Any, point: Any) -> tuple[list[Any], list[list[Any]]]:
@@ -524,13 +650,22 @@ def _leaving(g: list[Any], u: list[Any], low: list[Any], high: list[Any]) -> lis
 
 
 def _bounded_step(
-    A: list[list[Any]], g: list[Any], damping: Any, u: list[Any], low: list[Any], high: list[Any]
+    A: list[list[Any]],
+    g: list[Any],
+    damping: Any,
+    u: list[Any],
+    low: list[Any],
+    high: list[Any],
+    idle: list[Any],
 ) -> list[Any]:
-    """Solve (A + λ diag A) δ = −g, then again with the unknowns on the bounds that they would cross."""
+    """Solve (A + λ diag A) δ = −g, then again with the unknowns on the bounds that they would cross.
+
+    Those that are ``idle`` stay where they are.
+    """
     import drjit as dr
 
     size = len(u)
-    held = _leaving(g, u, low, high)
+    held = [leaving | still for leaving, still in zip(_leaving(g, u, low, high), idle, strict=True)]
     known = [dr.zeros(type(u[0]), 1) for _ in range(size)]
     step = _damped_step(A, g, damping, held, known)
     for _ in range(BOUND_PASSES):
@@ -581,3 +716,21 @@ def _damped_step(
             value = value - L[q][i] * x[q]
         x[i] = value * inverse[i]
     return [dr.select(held[i], known[i], x[i] * scale[i]) for i in range(size)]
+
+
+def _nothing_to_gain(solution: Solution, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
+    """Numbers of the lanes that stopped short though no step, however long, promises more than nothing."""
+    found = []
+    for lane in np.flatnonzero(np.isin(solution.status, (Status.STALLED, Status.ITERATIONS))):
+        u, g, A = solution.u[lane], solution.gradient[lane], solution.information[lane]
+        leaving = ((u <= lower[lane]) & (g > 0.0)) | ((u >= upper[lane]) & (g < 0.0))
+        span = upper[lane] - lower[lane]
+        idle = np.diag(A) * span**2 <= NO_INFLUENCE**2 * solution.cost[lane]
+        free = np.flatnonzero(~(leaving | idle))
+        scale = 1.0 / np.sqrt(np.diag(A)[free])
+        step = np.linalg.lstsq(A[np.ix_(free, free)] * np.outer(scale, scale), g[free] * scale, rcond=1e-12)[
+            0
+        ]
+        if 0.5 * float(step @ (g[free] * scale)) <= NOTHING_TO_GAIN * solution.cost[lane]:
+            found.append(lane)
+    return np.array(found, dtype=int)

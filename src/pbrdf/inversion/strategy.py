@@ -20,6 +20,7 @@ from pbrdf.inversion.clusters import cluster
 from pbrdf.inversion.observations import Observations
 from pbrdf.inversion.problem import Space, residuals
 from pbrdf.inversion.solver import Solution, solve
+from pbrdf.inversion.thinning import thinned
 from pbrdf.optics.half_difference import facet_tilt
 
 __all__ = ["STRATEGIES", "Stage", "joint", "stepwise"]
@@ -29,6 +30,9 @@ STRATEGIES = ("joint", "stepwise")
 LOBE_WIDTH = 4.5
 #: First guess of the width for choosing geometries, and how often the choice is revised.
 WIDE, REVISIONS = 0.1, 4
+
+#: Ends of a search of part of the geometries with up to so many times the best χ², and so many of them, see all.
+RIVALS, MOST_RIVALS = 1.25, 4
 
 Progress = Callable[[int, int], None] | None
 
@@ -40,7 +44,7 @@ class Stage:
     Attributes
     ----------
     name
-        ``"diffuse"``, ``"specular"`` or ``"joint"``.
+        ``"search"`` (on part of the geometries), ``"diffuse"``, ``"specular"`` or ``"joint"``.
     free, held
         Names of the parameters that were free, and values of those held, at the best start.
     values
@@ -64,7 +68,8 @@ def joint(
 ) -> tuple[Solution, list[Stage]]:
     """Search from all starts with the draft accuracy, then refine each distinct end with the model's own.
 
-    Every start gets the refined end of its cluster.
+    Every start gets the refined end of its cluster. Many geometries are searched in part
+    (:mod:`pbrdf.inversion.thinning`), and the best ends then refined on all; χ² of the others is that of the part.
 
     Parameters
     ----------
@@ -78,9 +83,14 @@ def joint(
     Returns
     -------
     solution, stages
-        S lanes; and the one stage.
+        S lanes; and the stages: ``"search"`` if only part of the geometries were searched, and ``"joint"``.
     """
     low, high = space.box
+    part = thinned(space, data)
+    if part is not None:
+        found, (stage,) = joint(space, part, first, max_iterations, progress)
+        solution = _on_all(space, data, part, found, low, high, max_iterations, progress)
+        return solution, [replace(stage, name="search"), _stage("joint", space, solution, space.names, data)]
     search = solve(
         residuals(space, [data], len(first), accuracy="draft"),
         first,
@@ -258,6 +268,39 @@ def _refine(
     lost = ~np.isfinite(search.cost)
     columns["cost"] = np.where(lost, np.inf, columns["cost"])
     columns["status"] = np.where(lost, search.status, columns["status"])
+    return Solution(**columns)
+
+
+def _on_all(
+    space: Space,
+    data: Observations,
+    part: Observations,
+    found: Solution,
+    low: np.ndarray,
+    high: np.ndarray,
+    max_iterations: int,
+    progress: Progress,
+) -> Solution:
+    """The best ends of a search of part of the geometries, refined on all; the others with χ² as the part has it."""
+    clusters = cluster(found.u, found.cost, high - low, 1e-3, 1e-3)
+    if not clusters:
+        return found
+    limit = RIVALS * found.cost[clusters[0][0]]
+    kept = [members for members in clusters if found.cost[members[0]] <= limit][:MOST_RIVALS]
+    refined = solve(
+        residuals(space, [data], len(kept)),
+        found.u[[members[0] for members in kept]],
+        low,
+        high,
+        max_iterations=max_iterations,
+        progress=progress,
+    )
+    scale = 1.0 if space.loss == "linear" else data.count / part.count
+    columns = {f.name: getattr(found, f.name).copy() for f in fields(Solution)}
+    columns["cost"] = np.maximum(scale * columns["cost"], RIVALS * refined.cost.min())
+    for number, members in enumerate(kept):
+        for name, column in columns.items():
+            column[members] = getattr(refined, name)[number]
     return Solution(**columns)
 
 

@@ -64,6 +64,12 @@ class Level(enum.StrEnum):
     DESCRIBES = "describes"
     IN_PART = "in_part"
     DOES_NOT = "does_not"
+    NOT_CONVERGED = "not_converged"
+
+    @property
+    def usable(self) -> bool:
+        """Whether the parameters say anything of the sample."""
+        return self in (Level.DESCRIBES, Level.IN_PART)
 
 
 @dataclass(frozen=True)
@@ -185,7 +191,7 @@ def verdict(result: Optimum) -> Verdict:
         ``does_not`` if half of the fitted or of the held-out intensity is missed (median error above 50 %), if 80 % of
         the polarisation is and the intensity fails as well or was not measured, or if something fails and the model
         explains no channel better than a constant; ``describes`` if neither the whole nor any stratum fails, those at
-        grazing incidence aside; else ``in_part``.
+        grazing incidence aside; else ``in_part``. ``not_converged`` before all these if the fit stands at no minimum.
     """
     strata = list(_strata(result))
     whole = [s for s in strata if not s.where]
@@ -193,7 +199,9 @@ def verdict(result: Optimum) -> Verdict:
     explained = _explained(result)
     nothing = bool(explained) and max(explained.values()) < EXPLAINS
     counting = [s for s in failing if not s.grazing]
-    if any(_hopeless(s, whole, counting) for s in whole) or (counting and nothing):
+    if not result.settled:
+        level = Level.NOT_CONVERGED
+    elif any(_hopeless(s, whole, counting) for s in whole) or (counting and nothing):
         level = Level.DOES_NOT
     elif counting:
         level = Level.IN_PART
@@ -201,11 +209,7 @@ def verdict(result: Optimum) -> Verdict:
         level = Level.DESCRIBES
     unsure = [name for name, e in result.estimates.items() if not quotable(e)]
     on_bounds = [name for name in unsure if result.estimates[name].verdict.startswith("at ")]
-    silent = (
-        [n for n, e in result.estimates.items() if e.verdict != "fixed"]
-        if level == Level.DOES_NOT
-        else unsure
-    )
+    silent = [n for n, e in result.estimates.items() if e.verdict != "fixed"] if not level.usable else unsure
     return Verdict(
         level,
         _sentence(level, whole, failing, (on_bounds, [n for n in unsure if n not in on_bounds]), nothing),
@@ -410,6 +414,8 @@ def _sentence(
     nothing: bool,
 ) -> str:
     overall = "; ".join(_overall(whole))
+    if level == Level.NOT_CONVERGED:
+        return f"The fit has not converged: its numbers are no result, do not quote them; {overall}."
     if level == Level.DOES_NOT:
         also = ", and the fit explains no more than a constant would" if nothing else ""
         return f"The model does not describe this sample, do not quote its parameters: {overall}{also}."

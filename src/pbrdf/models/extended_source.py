@@ -139,7 +139,8 @@ def _averaged_specular(
     template = model.kernel(geometry, values, "specular")
     used = [(i, j) for i in range(4) for j in range(4) if not is_zero(template[i][j])]
 
-    def body(k: Any, total: Any, geometry: Geometry, radius: Any, given: Any) -> tuple[Any, ...]:
+    def body(k: Any, total: Any, vectors: Any, radius: Any, given: Any) -> tuple[Any, ...]:
+        geometry = Geometry(*vectors)
         named = {**values, **dict(zip(names, given, strict=True))}
         x, y, weight = (dr.gather(F, column, k) for column in columns)
         irradiance = total[-1]
@@ -147,13 +148,13 @@ def _averaged_specular(
         weight = dr.select(above, weight * ray.cos_i, 0.0)
         f = model.kernel(ray, named, "specular")
         total = [dr.fma(weight, f[i][j], t) for (i, j), t in zip(used, total[:-1], strict=True)]
-        return k + 1, [*total, irradiance + weight], geometry, radius, given
+        return k + 1, [*total, irradiance + weight], vectors, radius, given
 
     sums = dr.while_loop(
         (
             UInt(0),
             [dr.zeros(F, 1) for _ in (*used, None)],
-            geometry,
+            tuple(geometry),
             radius,
             [values[name] for name in names],
         ),

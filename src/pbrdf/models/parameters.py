@@ -31,6 +31,9 @@ class Parameter:
         Whether a fit leaves it free by default; those that it does not are given to the constructor by name only.
     logarithmic
         Whether starting values are spread evenly in its logarithm.
+    even
+        Whether everything depends on its square: that is then the unknown of a fit, as the derivative by itself
+        vanishes at 0.
     part
         Part of the model that it shapes: ``"specular"``, ``"diffuse"`` or ``"both"``. The stepwise strategy fits those
         of the diffuse part by themselves.
@@ -52,6 +55,7 @@ class Parameter:
     default: float
     fitted: bool = True
     logarithmic: bool = False
+    even: bool = False
     part: Literal["specular", "diffuse", "both"] = "both"
     amplitude: bool = False
     vanishing: bool = False

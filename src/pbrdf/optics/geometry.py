@@ -31,6 +31,9 @@ def cross(a: Vector, b: Vector) -> Vector:
 class Geometry(NamedTuple):
     """One illumination and view geometry, as vectors.
 
+    As the state of a symbolic loop it goes as a plain ``tuple(geometry)`` and is made again in the body: within another
+    symbolic loop, Dr.Jit 1.5 drops the derivatives of the fields of a named tuple without a word.
+
     Attributes
     ----------
     omega_i, omega_r

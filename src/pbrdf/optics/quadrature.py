@@ -139,8 +139,10 @@ def facet_average(
     c_i = wedge_distance(geometry.cos_i, geometry.sin_i, sigma)
     c_r = wedge_distance(geometry.cos_r, geometry.sin_r, sigma)
     zeros = [dr.zeros(F, 1) for _ in range(size)]
+    vectors = tuple(geometry)  # as loop state a plain tuple, see Geometry
 
-    def add(total: Any, m: Any, weight: Any, geometry: Geometry, args: Any, check: bool) -> list[Any]:
+    def add(total: Any, m: Any, weight: Any, vectors: Any, args: Any, check: bool) -> list[Any]:
+        geometry = Geometry(*vectors)
         mu_i = dr.fma(m[0], geometry.omega_i[0], m[2] * geometry.omega_i[2])
         mu_r = dr.fma(
             m[0], geometry.omega_r[0], dr.fma(m[1], geometry.omega_r[1], m[2] * geometry.omega_r[2])
@@ -166,17 +168,17 @@ def facet_average(
     count = dr.select(wedge_lanes, UInt(0), dr.select(narrow, UInt(3), UInt(7)))
     nodes = [table(F, column) for column in _RULES]
 
-    def clear_body(j: Any, total: Any, sigma: Any, geometry: Any, args: Any) -> tuple[Any, ...]:
+    def clear_body(j: Any, total: Any, sigma: Any, vectors: Any, args: Any) -> tuple[Any, ...]:
         x, y, weight = (node(offset + j, j < count) for node in nodes)
         mx, my = x * sigma, y * sigma
         inverse = dr.rsqrt(dr.fma(mx, mx, dr.fma(my, my, 1.0)))
         mx, my = mx * inverse, my * inverse
         for m_x, m_y in ((mx, my), (-my, mx), (-mx, -my), (my, -mx)):
-            total = add(total, (m_x, m_y, inverse), weight, geometry, args, False)
-        return j + 1, total, sigma, geometry, args
+            total = add(total, (m_x, m_y, inverse), weight, vectors, args, False)
+        return j + 1, total, sigma, vectors, args
 
     clear = dr.while_loop(
-        (UInt(0), zeros, sigma, geometry, args),
+        (UInt(0), zeros, sigma, vectors, args),
         lambda j, *_: j < count,
         clear_body,
         label="facets",
@@ -184,7 +186,7 @@ def facet_average(
     )[1]
     axes = _wedge_axes(geometry, c_i, c_r)
 
-    def row_body(row: Any, total: Any, sigma: Any, geometry: Any, axes: Any, args: Any) -> tuple[Any, ...]:
+    def row_body(row: Any, total: Any, sigma: Any, vectors: Any, axes: Any, args: Any) -> tuple[Any, ...]:
         f, e, w_max, lower, upper = axes
         w, dw = _squeeze_below((F(row) - half) * step, w_max, steepness, flatness)
         low = dr.clip(dr.fma(lower[1], w, lower[0]), -_FAR, _FAR)
@@ -194,7 +196,7 @@ def facet_average(
         row_weight = (step * step * (0.5 / math.pi)) * dr.exp(-0.5 * w * w) * dw * narrowness
 
         def column_body(
-            column: Any, total: Any, sigma: Any, geometry: Any, args: Any, axes: Any, limits: Any
+            column: Any, total: Any, sigma: Any, vectors: Any, args: Any, axes: Any, limits: Any
         ) -> tuple[Any, ...]:
             f, e = axes
             w, low, high, row_weight = limits
@@ -202,21 +204,21 @@ def facet_average(
             weight = row_weight * dv * dr.exp(-0.5 * v * v)
             x, y = sigma * dr.fma(f[0], w, e[0] * v), sigma * dr.fma(f[1], w, e[1] * v)
             inverse = dr.rsqrt(dr.fma(x, x, dr.fma(y, y, 1.0)))
-            total = add(total, (x * inverse, y * inverse, inverse), weight, geometry, args, True)
-            return column + 1, total, sigma, geometry, args, axes, limits
+            total = add(total, (x * inverse, y * inverse, inverse), weight, vectors, args, True)
+            return column + 1, total, sigma, vectors, args, axes, limits
 
         columns = dr.while_loop(
-            (UInt(0), list(zeros), sigma, geometry, args, (f, e), (w, low, high, row_weight)),
+            (UInt(0), list(zeros), sigma, vectors, args, (f, e), (w, low, high, row_weight)),
             lambda column, *_: column < axis_nodes,
             column_body,
             label="wedge columns",
             max_iterations=-1,
         )[1]
         total = [a + b for a, b in zip(total, columns, strict=True)]
-        return row + 1, total, sigma, geometry, axes, args
+        return row + 1, total, sigma, vectors, axes, args
 
     wedge = dr.while_loop(
-        (UInt(0), list(zeros), sigma, geometry, axes, args),
+        (UInt(0), list(zeros), sigma, vectors, axes, args),
         lambda row, *_: wedge_lanes & (row < axis_nodes),
         row_body,
         label="wedge rows",

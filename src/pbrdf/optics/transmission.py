@@ -66,11 +66,15 @@ def exit_polarisation(
         mean, half = transmittances(mu_r, n, kappa, transmittance)
         q, u = tilt_rotation(m, geometry.p_r, geometry.s_r)
         half = W * half
-        return W, W * mean, half * q, half * u
+        values = (W * mean, half * q, half * u)
+        return (*values, W) if weighted else values
 
-    E_W, intensity, q, u = facet_average(integrand, 4, geometry, sigma, (n, kappa, k), accuracy)
-    if normalization == "weighted":
-        scale = _inverse(E_W)
+    # W only where it is used: Dr.Jit 1.5 crashes on derivatives of a loop of which an output was dropped
+    weighted = normalization == "weighted"
+    found = facet_average(integrand, 4 if weighted else 3, geometry, sigma, (n, kappa, k), accuracy)
+    intensity, q, u = found[:3]
+    if weighted:
+        scale = _inverse(found[3])
     else:
         solid_angle, integral = visible_means(geometry, k, accuracy, unit)
         scale = solid_angle * _inverse(integral)

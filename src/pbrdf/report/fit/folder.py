@@ -149,6 +149,7 @@ def fit_record(report: Report) -> dict[str, Any]:
         "stages": [asdict(stage) for stage in result.stages],
         "starts": result.starts,
         "converged": result.converged,
+        "settled": result.settled,
         "noise": result.noise,
         "uncertainties_from_data": result.std_known,
         "hold_out": None if result.hold_out is None else str(result.hold_out),

@@ -14,7 +14,7 @@ import numpy as np
 from pbrdf.data.schema import written
 from pbrdf.inversion.erroranalysis import ErrorStatistics, error_analysis
 from pbrdf.inversion.holdout import Prediction
-from pbrdf.inversion.verdict import Level, Verdict
+from pbrdf.inversion.verdict import Verdict
 from pbrdf.report.dataset.describe import cautions, describe
 from pbrdf.report.fit.subject import Report
 from pbrdf.report.fit.summary import (
@@ -122,7 +122,7 @@ def _fitted(report: Report, verdict: Verdict) -> Iterator[Markup]:
 
 def _parameter_table(report: Report, verdict: Verdict) -> Markup:
     rows, classes = [], []
-    described = verdict.level != Level.DOES_NOT
+    described = verdict.level.usable
     for e in report.result.estimates.values():
         p = e.parameter
         factor, unit = shown_unit(p)

@@ -11,7 +11,6 @@ from pbrdf.files.atomic import require_writable_folder
 from pbrdf.inversion.estimates import Estimate
 from pbrdf.inversion.holdout import Prediction
 from pbrdf.inversion.result import FitResult
-from pbrdf.inversion.verdict import Level
 from pbrdf.report.fit.checks import run_checks
 from pbrdf.report.fit.figure import fit_figure
 from pbrdf.report.fit.folder import parse_formats, write_report
@@ -36,7 +35,7 @@ def summary(result: FitResult, *, verbose: bool = False) -> str:
 def html(result: FitResult) -> str:
     """A table of the parameters, and in a line each how well they describe and predict the data."""
     verdict = result.verdict()
-    described = verdict.level != Level.DOES_NOT
+    described = verdict.level.usable
     rows = "".join(_row(name, estimate, described) for name, estimate in result.estimates.items())
     head = "".join(f"<th>{title}</th>" for title in ("parameter", "value", "unit", "verdict", "meaning"))
     sentences = [f"{result.model.name} fitted to {result.goodness.data} values of {_name(result)}"]

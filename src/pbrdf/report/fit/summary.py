@@ -13,7 +13,7 @@ from pbrdf.data.schema import written
 from pbrdf.inversion.comparison import NEAR_SPECULAR, near_specular_tilt
 from pbrdf.inversion.estimates import Estimate
 from pbrdf.inversion.result import FitResult
-from pbrdf.inversion.verdict import Level, Verdict
+from pbrdf.inversion.verdict import Verdict
 from pbrdf.report.dataset.describe import cautions, illumination_in_words, wavelengths_in_words
 from pbrdf.report.fit.subject import Report
 from pbrdf.report.numbers import brief, per_cent, shown_unit, with_error
@@ -264,7 +264,7 @@ def _parameter_table(result: FitResult, wide: bool, of: Verdict) -> Table:
         value = with_error(factor * e.value, factor * e.std)
         if e.verdict == "undetermined":
             value = f"({brief(factor * e.value, 3)})"
-        described = of.level != Level.DOES_NOT
+        described = of.level.usable
         verdict = Text(verdict_in_words(e, described=described), style=style if described else "yellow")
         table.add_row(label, *meaning, value, unit, limits, verdict)
     return table
@@ -284,8 +284,8 @@ def verdict_in_words(estimate: Estimate, *, described: bool = True) -> str:
         return "not determined by these data"
     if estimate.verdict.startswith("at "):
         return f"at its {estimate.verdict.removeprefix('at ')}"
-    if estimate.verdict == "fixed":
-        return "fixed"
+    if estimate.verdict in ("fixed", "not converged"):
+        return estimate.verdict
     if not described:
         return "do not quote"
     share = estimate.std / abs(estimate.value) if estimate.value else math.inf
@@ -381,6 +381,8 @@ def optima_in_words(result: FitResult) -> list[str]:
         return [f"none of {result.starts} starts converged"]
     best, *others = result.optima
     lines = [f"{best.count} of {result.starts} starts reached the best optimum (χ² = {brief(best.chi2)})"]
+    if not result.settled:
+        lines = [f"the best of {result.starts} starts (χ² = {brief(best.chi2)}) has not converged"]
     if others:
         second = others[0]
         times = second.chi2 / best.chi2 if best.chi2 > 0.0 else math.inf
