@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pbrdf.errors import DataError
-from pbrdf.instruments.calibration.analyzer_calibration import standard_inputs
+from pbrdf.instruments.calibration.analyzer_calibration import reduced_inputs, standard_inputs
 from pbrdf.instruments.calibration.input_table import InputTable
 from pbrdf.instruments.calibration.instrument_calibration import calibrate_instrument
 from pbrdf.instruments.frames.frames import ArrayFrames
@@ -143,3 +143,28 @@ def test_refusals():
     raw[1] = 260
     with pytest.raises(DataError, match="do not grow brighter"):
         calibrate_instrument(ArrayFrames(raw, few.names), instrument, few)
+
+
+def test_the_uncertainty_of_the_light_is_in_the_accuracy():
+    """Case M1: the generator's zero is off by 1.5°, which no input held out can show: the reduction is wrong by
+    2·1.5°/√2 = 3.7 % of Q and U, and the accuracy says so once the table does; without, there is a word."""
+    nominal = rotating_polarizer(np.deg2rad([0, 45, 90, 135]))
+    linear = standard_inputs(6, circular=False)
+    names = tuple("abcdef")
+    off = np.deg2rad(1.5)
+    frames = frames_of(nominal.turned(-off), InputTable(names, linear))
+    instrument = Instrument(nominal, DETECTOR)
+    silent = calibrate_instrument(frames, instrument, InputTable(names, linear))
+    assert silent.instrument.polarimeter.accuracy[0] < 0.005
+    assert "nominal one turned by -1.5°" in silent.warnings[0]
+    psi = np.pi * np.arange(6) / 6
+    std = 2 * off * np.abs([np.sin(2 * psi), np.cos(2 * psi), 0 * psi])
+    stated = calibrate_instrument(frames, instrument, InputTable(names, linear, std))
+    accuracy = stated.instrument.polarimeter.accuracy
+    assert accuracy[0] == pytest.approx(2 * off / np.sqrt(2), rel=0.02)
+    assert accuracy[1] == 0.0
+    assert stated.warnings == []
+    # the error that there really is
+    found = reduced_inputs(stated.instrument.polarimeter.analyzer, nominal.intensities(linear))
+    rms = np.sqrt(np.mean((found[1:3] / found[0] - linear[1:3]) ** 2))
+    assert rms == pytest.approx(accuracy[0], rel=0.05)
