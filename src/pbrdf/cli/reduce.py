@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from pbrdf.cli.console import output_console, progress_bar
+from pbrdf.cli.console import output_console, progress_bar, warn
 from pbrdf.cli.instruments import open_instrument
 from pbrdf.cli.options import (
     DarkLevel,
@@ -103,7 +103,7 @@ def reduce(
         raise PbrdfError(f"--datasets {datasets!r}: choose csv or nc")
     from pbrdf.files.atomic import require_writable_folder
     from pbrdf.instruments.frames.frame_files import open_frames
-    from pbrdf.instruments.frames.frames import ChosenSeries, Frames
+    from pbrdf.instruments.frames.frames import ChosenSeries, Frames, notes_of
     from pbrdf.instruments.goniometer.angle_table import read_angles
     from pbrdf.report.reduction.folder import Wanted, write_reduction
 
@@ -117,7 +117,7 @@ def reduce(
     if series is not None:
         names = [name.strip() for name in series.split(",") if name.strip()]
         found = ChosenSeries(found, names)
-        table = None if table is None else table.rows(names)
+        table = None if table is None else table.for_frames(found).rows(names)
     chosen = open_regions(regions, roi or [])
     if table is not None and not chosen:
         raise PbrdfError(
@@ -146,6 +146,8 @@ def reduce(
             max_memory=memory,
             progress=progress,
         )
+    for note in notes_of(found):
+        warn(note)
     if quiet:
         print(folder)
         return

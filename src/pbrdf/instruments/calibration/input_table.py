@@ -19,9 +19,9 @@ Or the Stokes vectors themselves: ``series,I,Q,U,V`` (without I: 1 everywhere). 
 columns may be separated.
 
 How well the light is known stands in ``angle_std_deg``, ``ellipticity_std_deg``, ``dop_std`` and ``dolp_std``, or in
-``Q_std``, ``U_std`` and ``V_std`` (in the unit of Q, U, V): standard uncertainties, which the calibration takes for errors that
-all inputs share, such as that of a polariser's zero. An angle ψ ± σ of light of the degree p turns (Q, U)/I by 2σ: its
-variance is (2σ p cos 2χ)² (sin² 2ψ, cos² 2ψ), and that of the ellipticity χ ± τ (2τ p)² (sin² 2χ cos² 2ψ,
+``Q_std``, ``U_std`` and ``V_std`` (in the unit of Q, U, V): standard uncertainties, which the calibration takes for
+errors that all inputs share, such as that of a polariser's zero. An angle ψ ± σ of light of the degree p turns (Q, U)/I
+by 2σ: its variance is (2σ p cos 2χ)² (sin² 2ψ, cos² 2ψ), and that of the ellipticity χ ± τ (2τ p)² (sin² 2χ cos² 2ψ,
 sin² 2χ sin² 2ψ, cos² 2χ) of (Q, U, V)/I, to first order.
 """
 

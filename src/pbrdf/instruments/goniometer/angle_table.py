@@ -32,7 +32,7 @@ from pbrdf.data.conventions import azimuth_forward_pi_to_zero
 from pbrdf.data.degrees import exact_degrees
 from pbrdf.errors import DataError
 from pbrdf.files.delimited import Table, read_table, write_table
-from pbrdf.instruments.frames.frames import named
+from pbrdf.instruments.frames.frames import Frames, color_sources_of, named
 
 __all__ = ["AngleTable", "read_angles", "write_angles"]
 
@@ -131,13 +131,40 @@ class AngleTable:
         missing = [name for name in names if name not in self.names]
         if missing:
             raise DataError(f"the angle table has no row for {named(missing)}; it has {named(self.names)}")
+        return replace(self._taken(names), names=tuple(names))
+
+    def for_frames(self, frames: Frames) -> AngleTable:
+        """The table with a row for each colour of each picture, where the camera sees several.
+
+        Rows of pictures serve all their colours: with the nominal wavelength of the colour if the table has none, and
+        where that is not known either, with the colour as group. A table that names the colours' series stays as it is.
+        """
+        sources = color_sources_of(frames)
+        if not sources or not {picture for picture, _, _ in sources} & set(self.names):
+            return self
+        chosen = [(picture, color, nm) for picture, color, nm in sources if picture in self.names]
+        table = self._taken([picture for picture, _, _ in chosen])
+        known = all(nm is not None for _, _, nm in chosen)
+        group, wavelength = np.asarray(table.group), table.wavelength
+        if wavelength is None and known:
+            wavelength = np.array([nm for _, _, nm in chosen], dtype=float)
+        elif wavelength is None:
+            plain = len(set(group.tolist())) == 1
+            group = np.array(
+                [color if plain else f"{g} {color}" for g, (_, color, _) in zip(group, chosen, strict=True)]
+            )
+        names = tuple(f"{picture}_{color}" for picture, color, _ in chosen)
+        return replace(table, names=names, group=group, wavelength=wavelength)
+
+    def _taken(self, names: Sequence[str]) -> AngleTable:
+        """Rows of these series, as often as they are named, under the numbers 1, 2, …"""
         index = np.array([self.names.index(name) for name in names], dtype=int)
         chosen: dict[str, Any] = {
-            field: getattr(self, field)[index]
+            field: np.asarray(getattr(self, field))[index]
             for field in (*_ANGLES, "exposure", "wavelength", "group")
             if getattr(self, field) is not None
         }
-        return replace(self, names=tuple(names), **chosen)
+        return replace(self, names=tuple(str(k) for k in range(len(names))), **chosen)
 
 
 def read_angles(path: str | Path) -> AngleTable:

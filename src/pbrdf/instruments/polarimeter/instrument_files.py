@@ -24,6 +24,7 @@ from pbrdf.files.atomic import atomic_file
 from pbrdf.files.text import read_toml
 from pbrdf.instruments.polarimeter.analyzer_files import read_analyzer, write_analyzer
 from pbrdf.instruments.polarimeter.band import Band, cauchy, gaussian_band, in_band, read_band, top_hat_band
+from pbrdf.instruments.polarimeter.color_filters import BAYER, ColorFilters
 from pbrdf.instruments.polarimeter.detector import Detector
 from pbrdf.instruments.polarimeter.instrument import FRAME_FILES, Instrument
 from pbrdf.instruments.polarimeter.polarimeter import Polarimeter, from_settings, measured
@@ -33,16 +34,17 @@ from pbrdf.instruments.polarimeter.retardance_sets import retardance_set
 __all__ = ["load_instrument", "save_instrument"]
 
 _COMMON = ("kind", "name", "states", "accuracy", "reference_angle", "stability")
+_COLORS = ("colors", "wavelengths", "greens")
 _KINDS: dict[str, tuple[str, ...]] = {
     "lcvr": ("axes", "retardances", "set", "analyzer", "diattenuation", "band"),
     "rotating_retarder": ("angles", "retardance", "analyzer", "diattenuation", "band"),
     "rotating_polarizer": ("angles", "diattenuation"),
-    "division_of_focal_plane": ("layout", "diattenuation"),
-    "measured": ("analyzer_file", "analyzer_vectors", "mosaic"),
-    "preset": ("preset",),
+    "division_of_focal_plane": ("layout", "diattenuation", *_COLORS),
+    "measured": ("analyzer_file", "analyzer_vectors", "mosaic", *_COLORS),
+    "preset": ("preset", *_COLORS),
 }
 _BAND = ("shape", "center", "width", "file", "reference", "birefringence")
-_DETECTOR = ("bits", "gain", "read_noise", "offset", "dark", "full_well")
+_DETECTOR = ("bits", "gain", "read_noise", "offset", "dark", "full_well", "full_scale", "alignment")
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
 
@@ -76,7 +78,9 @@ def load_instrument(path: str | Path) -> Instrument:
         instrument = replace(
             instrument,
             polarimeter=_described(table, instrument.polarimeter),
-            detector=_detector(path, content.get("detector", {}), instrument.detector),
+            detector=_detector(
+                path, content.get("detector", {}), instrument.detector, scaled=kind == "preset"
+            ),
             reference_angle=math.radians(table.number("reference_angle", 0.0)),
             stability=table.number("stability", instrument.stability),
         )
@@ -120,6 +124,12 @@ def save_instrument(instrument: Instrument, path: str | Path) -> None:
         table["analyzer_file"] = beside.name
         if polarimeter.mosaic is not None:
             table["mosaic"] = polarimeter.mosaic.tolist()
+    if polarimeter.filters is not None:
+        table["colors"] = polarimeter.filters.layout
+        if polarimeter.filters.wavelengths:
+            table["wavelengths"] = dict(polarimeter.filters.wavelengths)
+        if polarimeter.filters.apart:
+            table["greens"] = "apart"
     detector = {key: getattr(instrument.detector, key) for key in _DETECTOR}
     detector = {key: value for key, value in detector.items() if value is not None}
     frames = dict(instrument.frames)
@@ -294,6 +304,8 @@ def _described(table: _Table, polarimeter: Polarimeter) -> Polarimeter:
         if not (isinstance(states, list) and all(isinstance(s, str) for s in states)):
             raise table.wrong("states", "a list of names in quotes, one for each state")
         polarimeter = replace(polarimeter, states=tuple(states))
+    if set(_COLORS) & set(table.content):
+        polarimeter = replace(polarimeter, filters=_filters(table, polarimeter.filters))
     if "accuracy" in table.content:
         content = table.content["accuracy"]
         if not isinstance(content, dict):
@@ -303,10 +315,38 @@ def _described(table: _Table, polarimeter: Polarimeter) -> Polarimeter:
     return polarimeter
 
 
-def _detector(path: Path, content: Any, default: Detector) -> Detector:
+def _filters(table: _Table, default: ColorFilters | None) -> ColorFilters:
+    """The colours over the cells of a mosaic."""
+    if default is None and "colors" not in table.content:
+        raise DataError(f"{table.path}: [polarimeter] say which colours there are: colors = {_value(BAYER)}")
+    made = default or ColorFilters()
+    if "colors" in table.content:
+        rows = table.content["colors"]
+        if not (isinstance(rows, list) and rows and all(isinstance(r, list) for r in rows)) or not all(
+            isinstance(name, str) for row in rows for name in row
+        ):
+            raise table.wrong("colors", f"rows of names, such as {_value(BAYER)}")
+        made = replace(made, layout=tuple(map(tuple, rows)))
+    if "wavelengths" in table.content:
+        content = table.content["wavelengths"]
+        if not isinstance(content, dict) or not all(_is_number(v) for v in content.values()):
+            raise table.wrong("wavelengths", "nanometres of each colour, { R = 610, G = 540, B = 460 }")
+        made = replace(made, wavelengths={name: float(v) for name, v in content.items()})
+    if "greens" in table.content:
+        made = replace(made, apart=table.choice("greens", ("joined", "apart")) == "apart")
+    return made
+
+
+def _detector(path: Path, content: Any, default: Detector, *, scaled: bool) -> Detector:
     table = _Table(path, "detector", content, _DETECTOR, "the detector")
+    bits = content.get("bits")
+    if scaled and "gain" not in content and isinstance(bits, int) and 1 <= bits <= 16:
+        # the same electrons over more or fewer numbers
+        default = replace(default, gain=default.gain * 2.0 ** (default.bits - bits))
     for key, value in table.content.items():
-        if not _is_number(value):
+        if key == "alignment":
+            table.choice(key, ("left", "right"))
+        elif not _is_number(value):
             raise table.wrong(key, "a number")
     try:
         return replace(default, **table.content)
