@@ -90,4 +90,4 @@ def single(numbers: np.ndarray, detector: Detector, exposures: int = 1) -> Readi
         return Reading(numbers, detector.saturated(numbers))
     limit = detector.saturation - _MARGIN * float(np.sqrt(detector.variance(detector.saturation)))
     rounding = 1.0 / 12.0 if numbers.dtype.kind in "iu" else 0.0
-    return Reading(numbers, numbers >= limit, None, 1.0 / exposures, rounding)
+    return Reading(numbers, np.asarray(numbers >= limit), None, 1.0 / exposures, rounding)

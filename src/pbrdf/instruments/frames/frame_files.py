@@ -216,9 +216,9 @@ def _in_file(
 
 def _open_folder(folder: Path, layout: FrameLayout, states: Sequence[str], mosaic: bool) -> FileFrames:
     apart = {file.resolve() for file in layout.files}
-    suffixes = (*SUFFIXES, *RAW_SUFFIXES)
+    suffixes = [*SUFFIXES, *RAW_SUFFIXES]
     if layout.pattern is not None and layout.raw is not None:
-        suffixes = (*suffixes, Path(layout.pattern).suffix.lower())
+        suffixes.append(Path(layout.pattern).suffix.lower())
     files = [f for f in _pictures_in(folder, "*", suffixes) if f.resolve() not in apart]
     below = [f for f in _pictures_in(folder, "*/*", suffixes) if f.resolve() not in apart]
     pattern = layout.pattern or _usual_pattern(files, below, states, mosaic, layout)

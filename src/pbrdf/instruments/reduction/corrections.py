@@ -154,11 +154,12 @@ class PixelLevels:
 
     def part(self, cells: ColorCells) -> PixelLevels:
         """Those of one kind of cell of a colour mosaic."""
-        level, light, response, dead = (
-            cells.parts(array)[0] if isinstance(array, np.ndarray) else array
-            for array in (self.level, self.light, self.response, self.dead)
-        )
-        return PixelLevels(level, light, response, dead)
+
+        def part(values: np.ndarray | float) -> np.ndarray | float:
+            return cells.parts(values)[0] if isinstance(values, np.ndarray) else values
+
+        dead = None if self.dead is None else cells.parts(self.dead)[0]
+        return PixelLevels(part(self.level), part(self.light), part(self.response), dead)
 
     @property
     def black(self) -> np.ndarray | None:
