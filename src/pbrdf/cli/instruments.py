@@ -13,25 +13,30 @@ if TYPE_CHECKING:
 __all__ = ["open_instrument"]
 
 
-def open_instrument(source: str) -> Instrument:
+def open_instrument(source: str, *, mueller: bool = False) -> Instrument:
     """An instrument from its TOML file or the name of a built-in one.
 
     Parameters
     ----------
     source
         Path or name; a file of that name goes before a built-in instrument.
+    mueller
+        Take one that measures Mueller matrices too.
 
     Raises
     ------
     DataError
-        If there is neither, or the file is not understood.
+        If there is neither, the file is not understood, or the instrument measures something else.
     """
     from pbrdf.instruments.polarimeter.instrument_files import load_instrument
     from pbrdf.instruments.polarimeter.presets import PRESETS, preset
 
     path = Path(source)
     if path.exists() or path.suffix:
-        return load_instrument(path)
+        instrument = load_instrument(path)
+        if not mueller:
+            instrument.require_stokes()
+        return instrument
     if source in PRESETS:
         return preset(source)
     raise DataError(

@@ -130,6 +130,7 @@ def cell_means_of_frames(
     DataError
         If frames, instrument and regions do not fit each other, or no pixel is good.
     """
+    instrument.require_stokes()
     size = instrument.polarimeter.size
     if frames.states != size:
         raise DataError(

@@ -19,7 +19,7 @@ sample stood (the paper's Angle_S_I), kept for the record.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -34,7 +34,7 @@ from pbrdf.errors import DataError
 from pbrdf.files.delimited import Table, read_table, write_table
 from pbrdf.instruments.frames.frames import Frames, color_sources_of, named
 
-__all__ = ["AngleTable", "read_angles", "write_angles"]
+__all__ = ["AngleTable", "angles_of", "read_angles", "write_angles"]
 
 _ANGLES = ("theta_i", "theta_r", "phi", "reference_angle", "sample_angle")
 _COLUMNS = ("series", *_ANGLES[:3], "group", "wavelength", "exposure", *_ANGLES[3:])
@@ -175,11 +175,30 @@ def read_angles(path: str | Path) -> AngleTable:
     DataError
         Names the file, and the line and the column where there is one.
     """
-    path = Path(path)
-    table = read_table(path)
+    return angles_of(read_table(Path(path)))
+
+
+def angles_of(table: Table, others: Collection[str] = (), names: Sequence[str] | None = None) -> AngleTable:
+    """The angles in a table of text.
+
+    Parameters
+    ----------
+    table
+        As :func:`read_angles` reads it.
+    others
+        Columns that hold something else.
+    names
+        Of the series, where no column says so.
+
+    Raises
+    ------
+    DataError
+        As :func:`read_angles`.
+    """
+    path = table.path
     forward_at_zero = _stated(table, "azimuth", ("forward=0", "forward=180")) == "forward=0"
     usual = "rad" if _stated(table, "angles", ("degrees", "radians")) == "radians" else "deg"
-    columns = _columns(path, table.names, usual)
+    columns = _columns(path, table.names, usual, others, names is None)
     table.require_rows()
     values: dict[str, Any] = {}
     for name, (index, unit) in columns.items():
@@ -192,8 +211,9 @@ def read_angles(path: str | Path) -> AngleTable:
             if name in _ANGLES and unit != "rad":
                 values[name] = np.deg2rad(values[name])
     _sides(path, values)
+    own = values.pop("series", names)
     try:
-        return AngleTable(names=values.pop("series"), **values)
+        return AngleTable(names=tuple(own if names is None else names), **values)
     except DataError as error:
         raise DataError(f"{path}: {error}") from None
 
@@ -210,10 +230,14 @@ def _stated(table: Table, key: str, choices: tuple[str, str]) -> str:
     return choices[0]
 
 
-def _columns(path: Path, names: list[str], usual: str) -> dict[str, tuple[int, str | None]]:
+def _columns(
+    path: Path, names: list[str], usual: str, others: Collection[str], named_series: bool
+) -> dict[str, tuple[int, str | None]]:
     """Place and unit of each column that is known; angles without one are in the usual unit."""
     found: dict[str, tuple[int, str | None]] = {}
     for index, name in enumerate(names):
+        if name in others:
+            continue
         words = [word for word in re.split(r"[\s_.\-\[\]()]+", name.lower()) if word]
         unit = _UNITS.get(words[-1]) if len(words) > 1 else None
         key = "_".join(words[:-1] if unit else words)
@@ -227,7 +251,7 @@ def _columns(path: Path, names: list[str], usual: str) -> dict[str, tuple[int, s
             raise DataError(f"{path}: the unit of the column {name!r} is not understood")
         found[key] = (index, unit or (usual if key in _ANGLES else None))
     for key in _NEEDED:
-        if key not in found:
+        if key not in found and (key != "series" or named_series):
             raise DataError(f"{path}: there is no column {key}; the columns are {', '.join(names)}")
     return found
 

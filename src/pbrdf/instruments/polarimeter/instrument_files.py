@@ -27,6 +27,7 @@ from pbrdf.instruments.polarimeter.band import Band, cauchy, gaussian_band, in_b
 from pbrdf.instruments.polarimeter.color_filters import BAYER, ColorFilters
 from pbrdf.instruments.polarimeter.detector import Detector
 from pbrdf.instruments.polarimeter.instrument import FRAME_FILES, Instrument
+from pbrdf.instruments.polarimeter.mueller_polarimeter import dual_rotating_retarder
 from pbrdf.instruments.polarimeter.polarimeter import Polarimeter, from_settings, measured
 from pbrdf.instruments.polarimeter.presets import preset
 from pbrdf.instruments.polarimeter.retardance_sets import retardance_set
@@ -39,6 +40,21 @@ _KINDS: dict[str, tuple[str, ...]] = {
     "lcvr": ("axes", "retardances", "set", "analyzer", "diattenuation", "band"),
     "rotating_retarder": ("angles", "retardance", "analyzer", "diattenuation", "band"),
     "rotating_polarizer": ("angles", "diattenuation"),
+    "dual_rotating_retarder": (
+        "angles",
+        "generator_angles",
+        "analyzer_angles",
+        "steps",
+        "step",
+        "ratio",
+        "retardance",
+        "generator_retardance",
+        "analyzer_retardance",
+        "polarizer",
+        "analyzer",
+        "diattenuation",
+        "generator_reference_angle",
+    ),
     "division_of_focal_plane": ("layout", "diattenuation", *_COLORS),
     "measured": ("analyzer_file", "analyzer_vectors", "mosaic", *_COLORS),
     "preset": ("preset", *_COLORS),
@@ -67,12 +83,16 @@ def load_instrument(path: str | Path) -> Instrument:
     if "polarimeter" not in content:
         raise DataError(f"{path}: there is no table [polarimeter]; it says what the instrument is, kind = …")
     table = top.table("polarimeter")
+    if isinstance(table.content.get("kind"), str):
+        table.content["kind"] = table.content["kind"].replace("-", "_")
     kind = table.choice("kind", _KINDS)
     table = _Table(path, "polarimeter", table.content, (*_COMMON, *_KINDS[kind]), f"the kind {kind!r}")
     try:
         if kind == "preset":
             name = table.text("preset")
             instrument = preset(name)
+        elif kind == "dual_rotating_retarder":
+            instrument = _dual_rotating_retarder(table)
         else:
             instrument = Instrument(_polarimeter(table, kind))
         instrument = replace(
@@ -118,7 +138,10 @@ def save_instrument(instrument: Instrument, path: str | Path) -> None:
         table["accuracy"] = dict(zip(("linear", "circular"), map(float, polarimeter.accuracy), strict=True))
     table["reference_angle"] = _degrees(instrument.reference_angle)
     table["stability"] = float(instrument.stability)
-    if table["kind"] == "measured":
+    if instrument.generator is not None:
+        table |= instrument.generator.settings
+        table["generator_reference_angle"] = _degrees(instrument.generator.reference_angle)
+    elif table["kind"] == "measured":
         beside = path.with_name(f"{path.stem}_analyzer{'.nc' if polarimeter.is_map else '.csv'}")
         write_analyzer(polarimeter, beside)
         table["analyzer_file"] = beside.name
@@ -248,6 +271,43 @@ def _polarimeter(table: _Table, kind: str) -> Polarimeter:
         settings["analyzer"] = table.number("analyzer", 0.0)
     polarimeter = from_settings(settings)
     return _in_band(table, polarimeter) if "band" in table.content else polarimeter
+
+
+def _dual_rotating_retarder(table: _Table) -> Instrument:
+    content = table.content
+    lists = {"generator_angles", "analyzer_angles"} & set(content)
+    ways = [bool("angles" in content), bool(lists), bool({"steps", "step", "ratio"} & set(content))]
+    if sum(ways) > 1:
+        raise DataError(
+            f"{table.path}: [polarimeter] give angles as pairs [[generator, analyser], …], or generator_angles and "
+            "analyzer_angles, or steps, step and ratio"
+        )
+    if "angles" in content:
+        pairs = table.numbers("angles", 2)
+        if pairs.shape[1] != 2:
+            raise table.wrong("angles", "pairs [[generator, analyser], …]")
+        first, second = pairs.T
+    elif lists:
+        first = table.numbers("generator_angles", 1)
+        second = table.numbers("analyzer_angles", 1) if "analyzer_angles" in content else 5.0 * first
+    else:
+        steps = table.number("steps", 36)
+        if steps != int(steps) or not 16 <= steps <= 100_000:
+            raise table.wrong("steps", "a whole number from 16")
+        first = table.number("step", 180.0 / steps) * np.arange(int(steps))
+        second = table.number("ratio", 5.0) * first
+    both = table.number("retardance", 90.0)
+    polarimeter, generator = dual_rotating_retarder(
+        np.deg2rad(first),
+        np.deg2rad(second),
+        generator_retardance=math.radians(table.number("generator_retardance", both)),
+        analyzer_retardance=math.radians(table.number("analyzer_retardance", both)),
+        polarizer=math.radians(table.number("polarizer", 0.0)),
+        analyzer=math.radians(table.number("analyzer", 0.0)),
+        diattenuation=table.number("diattenuation", 1.0),
+    )
+    turned = math.radians(table.number("generator_reference_angle", 0.0))
+    return Instrument(polarimeter, generator=replace(generator, reference_angle=turned))
 
 
 def _in_band(table: _Table, polarimeter: Polarimeter) -> Polarimeter:

@@ -96,6 +96,7 @@ def reduced_blocks(
             f"{frames.states} frames a series for the {instrument.polarimeter.size} states of "
             f"{instrument.polarimeter.name}"
         )
+    instrument.require_stokes()
     instrument.polarimeter.require_intensity()
     corrections = Corrections.of(instrument, frames)
     top, bottom = rows if rows is not None else (0, frames.rows)
