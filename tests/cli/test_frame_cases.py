@@ -188,12 +188,17 @@ def test_readings_of_a_dual_rotating_retarder(run, tmp_path, instrument):
         M, std = ds["mueller"].values[k], ds["mueller_std"].values[k]
         assert (np.abs(M - scale * SAMPLE) < 4.5 * std).all()
         assert (std < 1.5).all()
-    # what contradicts the settings is said
+    # a wrong retardance makes a matrix that no sample has, and fits; a wrong order of readings does not fit
     done = run(
         "reduce", str(tmp_path / "readings.csv"), "-p", instrument(DRR.replace("92", "110")), "-o",
         str(tmp_path / "w"),
     )  # fmt: skip
-    assert "are retardances, axes and the order of the states right?" in done.stderr
+    assert "no sample has this Mueller matrix" in done.stderr
+    assert "order of the states" not in done.stderr
+    rolled = [f"a,{value:.3f}" for value in np.roll(readings, 1)]
+    (tmp_path / "rolled.csv").write_text("\n".join(["series,reading", *rolled]) + "\n")
+    done = run("reduce", str(tmp_path / "rolled.csv"), "-p", instrument(DRR), "-o", str(tmp_path / "o"))
+    assert "is the order of the states right" in done.stderr
     missing = "\n".join([header, *lines[:10]]) + "\n"
     (tmp_path / "few.csv").write_text(missing)
     done = run("reduce", str(tmp_path / "few.csv"), "-p", instrument(DRR), "-o", str(tmp_path / "f"), code=2)
@@ -217,7 +222,7 @@ def test_frames_of_a_dual_rotating_retarder(run, tmp_path, instrument):
     common = ("--angles", str(tmp_path / "angles.csv"), "--roi", "paint=0:8,0:8", "-o", str(tmp_path / "r"))
     found = {}
     for name, more in (("run", ""), ("p1.npy", '[frames]\npages = "repeat, state"\n')):
-        done = run("reduce", str(tmp_path / name), "-p", instrument(table + more), *common)
+        run("reduce", str(tmp_path / name), "-p", instrument(table + more), *common)
         ds = found[name] = read(tmp_path / "r" / "paint.csv")
         M, std = ds["mueller"].values[0], ds["mueller_std"].values[0]
         assert (np.abs(M - 1500 * SAMPLE) < 4.5 * std).all()

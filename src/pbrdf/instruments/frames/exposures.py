@@ -77,7 +77,7 @@ def combine(raw: np.ndarray, detector: Detector, exposures: int = 1) -> Reading:
         squares += np.square(exposure - numbers)
     return Reading(
         numbers,
-        one.saturated.any(axis=0),
+        np.any(one.saturated, axis=0),
         squares / ((count - 1) * count),
         one.share / count,
         one.rounding / count,
@@ -90,4 +90,4 @@ def single(numbers: np.ndarray, detector: Detector, exposures: int = 1) -> Readi
         return Reading(numbers, detector.saturated(numbers))
     limit = detector.saturation - _MARGIN * float(np.sqrt(detector.variance(detector.saturation)))
     rounding = 1.0 / 12.0 if numbers.dtype.kind in "iu" else 0.0
-    return Reading(numbers, np.asarray(numbers >= limit), None, 1.0 / exposures, rounding)
+    return Reading(numbers, np.greater_equal(numbers, limit), None, 1.0 / exposures, rounding)

@@ -47,6 +47,7 @@ __all__ = ["MuellerMeans", "mueller_dataset", "mueller_of_frames", "mueller_of_t
 
 #: Bytes that a number of a state takes while it is averaged.
 _BYTES = 60
+_SETTINGS = ("generator_retardance", "analyzer_retardance", "polarizer", "analyzer")
 _GENERATOR = ("generator_deg", "generator_angle_deg", "generator", "psg_deg", "psg")
 _ANALYZER = ("analyzer_deg", "analyzer_angle_deg", "analyzer", "analyser_deg", "analyser", "psa_deg", "psa")
 _READING = ("intensity", "reading", "signal")
@@ -67,6 +68,8 @@ class MuellerMeans:
         Of the 16 elements row by row, shape (M, 16, 16); NaN where nothing says how noisy the readings are.
     residual
         Rms of readings minus those of the matrix over their mean, shape (M,).
+    noise
+        What the noise of the readings alone makes of it, shape (M,); NaN where nothing says how noisy they are.
     counts
         For each series how many pixels were good, saturated, dead; readings of a table are good.
     angles
@@ -77,6 +80,7 @@ class MuellerMeans:
     mueller: np.ndarray
     covariance: np.ndarray
     residual: np.ndarray
+    noise: np.ndarray
     counts: tuple[dict[str, int], ...]
     angles: AngleTable | None = None
 
@@ -179,7 +183,15 @@ def _means(names: Sequence[str], sums: Sequence[_Sum], instrument: Instrument) -
     mueller, covariance, residual = solve_mueller(
         readings, variance, _generator(instrument), instrument.polarimeter.mean_analyzer
     )
-    return MuellerMeans(tuple(names), mueller, covariance, residual, tuple(s.counts for s in sums))
+    counts = tuple(s.counts for s in sums)
+    return MuellerMeans(tuple(names), mueller, covariance, residual, _noise(readings, variance), counts)
+
+
+def _noise(readings: np.ndarray, variance: np.ndarray) -> np.ndarray:
+    """Expected rms residual of 16 elements fitted to the readings (..., N), over their mean."""
+    count = readings.shape[-1]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.sqrt(variance.mean(axis=-1) * (count - 16) / count) / np.abs(readings.mean(axis=-1))
 
 
 def mueller_of_table(path: str | Path, instrument: Instrument) -> MuellerMeans:
@@ -224,9 +236,9 @@ def mueller_of_table(path: str | Path, instrument: Instrument) -> MuellerMeans:
         _solved(table.taken(rows), used, name, instrument)
         for name, rows in zip(names, sets.values(), strict=True)
     ]
-    mueller, covariance, residual = (np.stack([part[k] for part in parts]) for k in range(3))
+    mueller, covariance, residual, noise = (np.stack([part[k] for part in parts]) for k in range(4))
     counts = tuple({"good": len(rows), "saturated": 0, "dead": 0} for rows in sets.values())
-    return MuellerMeans(names, mueller, covariance, residual, counts, angles)
+    return MuellerMeans(names, mueller, covariance, residual, noise, counts, angles)
 
 
 def _one_of(table: Table, names: Sequence[str]) -> str | None:
@@ -249,7 +261,9 @@ def _require_one_geometry(table: Table, rows: Sequence[int], geometry: Sequence[
 
 def _solved(
     table: Table, used: Mapping[str, str | None], name: str, instrument: Instrument
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Matrix, covariance, residual and its part that is noise, of one set of readings."""
+
     def numbers(key: str) -> np.ndarray | None:
         column = used[key]
         return None if column is None else table.numbers(table.column(column))
@@ -262,13 +276,14 @@ def _solved(
     generator, analyzer = _generator(instrument), instrument.polarimeter.mean_analyzer
     if first is not None and second is not None:
         settings = instrument.generator.settings if instrument.generator is not None else {}
+        turned = {key: float(np.deg2rad(settings[key])) for key in _SETTINGS}
         made, source = dual_rotating_retarder(
             np.deg2rad(first),
             np.deg2rad(second),
-            **{
-                key: float(np.deg2rad(settings[key]))
-                for key in ("generator_retardance", "analyzer_retardance", "polarizer", "analyzer")
-            },
+            generator_retardance=turned["generator_retardance"],
+            analyzer_retardance=turned["analyzer_retardance"],
+            polarizer=turned["polarizer"],
+            analyzer=turned["analyzer"],
             diattenuation=settings["diattenuation"],
         )
         generator, analyzer = source.stokes, made.analyzer
@@ -278,9 +293,10 @@ def _solved(
             f"instrument: give the angles of each, {_GENERATOR[0]} and {_ANALYZER[0]}"
         )
     try:
-        return solve_mueller(readings, None if std is None else std**2, generator, analyzer)
+        solved = solve_mueller(readings, None if std is None else std**2, generator, analyzer)
     except DataError as error:
         raise DataError(f"{table.path}: series {name!r}: {error}") from None
+    return *solved, np.array(np.nan) if std is None else _noise(readings, std**2)
 
 
 def _generator(instrument: Instrument) -> np.ndarray:

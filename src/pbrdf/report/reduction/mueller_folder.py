@@ -14,6 +14,7 @@ from pbrdf.files.delimited import write_table
 from pbrdf.instruments.goniometer.angle_table import AngleTable
 from pbrdf.instruments.polarimeter.instrument import Instrument
 from pbrdf.instruments.reduction.mueller_reduction import MuellerMeans, mueller_dataset
+from pbrdf.optics.mueller import coherency_eigenvalues
 from pbrdf.report.reduction.gallery import safe_name
 from pbrdf.version import __version__
 
@@ -22,8 +23,11 @@ if TYPE_CHECKING:
 
 __all__ = ["mueller_warnings", "print_mueller", "write_mueller"]
 
-#: Readings that differ from those of the matrix by more than this share of their mean contradict the settings.
-_CONTRADICTION = 0.02
+#: Readings that differ from those of the matrix by more than this share of their mean, or by so many times their noise,
+#: contradict the settings; a difference below the last share is nobody's concern.
+_CONTRADICTION, _NOISES, _SMALL = 0.02, 2.0, 0.002
+#: Negative eigenvalues of the coherency matrix up to this share of m00 are nobody's concern.
+_UNPHYSICAL = 0.02
 #: More matrices than this are not printed.
 _MOST = 6
 
@@ -93,16 +97,37 @@ def mueller_warnings(found: Mapping[str, MuellerMeans]) -> list[str]:
     """What a user should know, one sentence each."""
     said = []
     for region, means in found.items():
-        worst = int(np.argmax(np.nan_to_num(means.residual)))
-        if np.nan_to_num(means.residual[worst]) > _CONTRADICTION:
+        residual = np.nan_to_num(means.residual)
+        limit = np.where(np.isnan(means.noise), _CONTRADICTION, np.maximum(_NOISES * means.noise, _SMALL))
+        worst = int(np.argmax(residual / limit))
+        if residual[worst] > limit[worst]:
             said.append(
                 f"{region}, series {means.names[worst]!r}: the readings differ from those of the Mueller matrix by "
-                f"{means.residual[worst]:.1%} of their mean: are retardances, axes and the order of the states right?"
+                f"{means.residual[worst]:.1%} of their mean: is the order of the states right, and was the light "
+                "steady? (A wrong retardance does not show so: measure without a sample, and compare with the unit matrix.)"
             )
+        said += _unphysical(region, means)
         lost = [n for n, c in zip(means.names, means.counts, strict=True) if not c["good"]]
         if lost:
             said.append(f"{region}: no good pixel in series {', '.join(lost)}")
     return said
+
+
+def _unphysical(region: str, means: MuellerMeans) -> list[str]:
+    """Whether a matrix is none of a passive sample, by more than noise."""
+    for name, M, std in zip(means.names, means.mueller, means.std, strict=True):
+        if not np.isfinite(M).all():
+            continue
+        least = float(coherency_eigenvalues(M).min())
+        # an eigenvalue is a mean of elements: of noise alone it is not below a few of their standard errors
+        noise = float(np.nanmax(std)) if np.isfinite(std).any() else 0.0
+        if least < -max(_NOISES * noise, _UNPHYSICAL * M[0, 0]):
+            return [
+                f"{region}, series {name!r}: no sample has this Mueller matrix (an eigenvalue of its coherency matrix "
+                f"is {least / M[0, 0]:.2g} of m00): are the retardances and axes of the instrument right? Measure "
+                "without a sample, and compare with the unit matrix"
+            ]
+    return []
 
 
 def print_mueller(found: Mapping[str, MuellerMeans], console: Console) -> None:
