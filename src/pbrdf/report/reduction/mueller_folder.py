@@ -104,7 +104,7 @@ def mueller_warnings(found: Mapping[str, MuellerMeans]) -> list[str]:
             said.append(
                 f"{region}, series {means.names[worst]!r}: the readings differ from those of the Mueller matrix by "
                 f"{means.residual[worst]:.1%} of their mean: is the order of the states right, and was the light "
-                "steady? (A wrong retardance does not show so: measure without a sample, and compare with the unit matrix.)"
+                "steady? (A wrong retardance does not show so: measure without a sample, compare with the unit matrix.)"
             )
         said += _unphysical(region, means)
         lost = [n for n, c in zip(means.names, means.counts, strict=True) if not c["good"]]
