@@ -43,10 +43,10 @@ def reduce(
             metavar="FRAMES",
             help="Raw frames: a folder of PNG, TIFF or NPY files (one a state, called SERIES_STATE, or a folder a "
             "series), a TIFF or NPY stack, raw camera files, netCDF, Zarr, or mosaic pictures; or a CSV table of "
-            "readings of a dual rotating retarder.",
+            "readings of a dual rotating retarder; or a rendered Stokes picture (OpenEXR, without --polarimeter).",
         ),
     ],
-    polarimeter: Annotated[str, polarimeter_option()],
+    polarimeter: Annotated[str | None, polarimeter_option()] = None,
     output: Annotated[
         Path | None,
         output_option("Folder for the results.", show_default="<frames>-reduced"),
@@ -117,6 +117,21 @@ def reduce(
         from pbrdf.data.formats.zarr_folder import require_zarr
 
         require_zarr(Path("stokes.zarr"))
+    if frames.suffix.lower() == ".exr":
+        _reduce_pictures(
+            frames,
+            output=output,
+            regions=open_regions(regions, roi or []),
+            angles=angles,
+            datasets=datasets,
+            quiet=quiet,
+        )
+        return
+    if polarimeter is None:
+        raise PbrdfError(
+            "--polarimeter: say what took the frames: the TOML file of the instrument, or a built-in one "
+            "(docs/instruments.md)"
+        )
     instrument = open_instrument(polarimeter, mueller=True)
     if instrument.generator is not None:
         _reduce_mueller(
@@ -250,6 +265,47 @@ def _reduce_mueller(
     console = output_console()
     print_mueller(found, console)
     console.print(f"\nWritten to {folder}/: {', '.join(path.name for path in files)}", markup=False)
+
+
+def _reduce_pictures(
+    path: Path,
+    *,
+    output: Path | None,
+    regions: dict[str, Region],
+    angles: Path | None,
+    datasets: str,
+    quiet: bool,
+) -> None:
+    """Means of regions of a rendered picture."""
+    from pbrdf.instruments.goniometer.angle_table import read_angles
+    from pbrdf.instruments.reduction.regions import Rectangle
+    from pbrdf.rendering.picture_regions import open_series
+    from pbrdf.rendering.variant import start_mitsuba
+    from pbrdf.report.reduction.folder import WHOLE_PICTURE, write_picture_reduction
+    from pbrdf.report.reduction.summary import print_averages
+
+    if not path.is_file():
+        raise PbrdfError(f"{path}: there is no such file")
+    start_mitsuba()
+    series = open_series([path])
+    rows, columns = series.shape
+    table = None if angles is None else read_angles(angles)
+    if table is not None and not regions:
+        raise PbrdfError(
+            f"--angles: say which part of the picture is the sample, for example --roi sample=0:{columns},0:{rows} for "
+            "all of it"
+        )
+    chosen = regions or {WHOLE_PICTURE: Rectangle(0, columns, 0, rows)}
+    result = write_picture_reduction(
+        series, chosen, _folder(path, output), angles=table, suffix=f".{datasets}", name=path.name
+    )
+    if quiet:
+        print(result.files[0].parent)
+        return
+    console = output_console()
+    print_averages(result.averages, series.names, console)
+    files = ", ".join(file.name for file in result.files)
+    console.print(f"\nWritten to {result.files[0].parent}/: {files}", markup=False)
 
 
 def memory_size(text: str, option: str) -> int:

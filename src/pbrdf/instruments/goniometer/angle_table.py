@@ -134,12 +134,15 @@ class AngleTable:
         return replace(self._taken(names), names=tuple(names))
 
     def for_frames(self, frames: Frames) -> AngleTable:
-        """The table with a row for each colour of each picture, where the camera sees several.
+        """The table with a row for each colour of each picture, where the camera sees several: :meth:`for_colors`."""
+        return self.for_colors(color_sources_of(frames))
+
+    def for_colors(self, sources: Sequence[tuple[str, str, float | None]]) -> AngleTable:
+        """The table with a row for each of these: name of a picture, colour, wavelength (nm) if it is known.
 
         Rows of pictures serve all their colours: with the nominal wavelength of the colour if the table has none, and
         where that is not known either, with the colour as group. A table that names the colours' series stays as it is.
         """
-        sources = color_sources_of(frames)
         if not sources or not {picture for picture, _, _ in sources} & set(self.names):
             return self
         chosen = [(picture, color, nm) for picture, color, nm in sources if picture in self.names]
