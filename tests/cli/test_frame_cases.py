@@ -232,3 +232,10 @@ def test_frames_of_a_dual_rotating_retarder(run, tmp_path, instrument):
     assert ratio == pytest.approx(2.0, rel=0.1)
     # other commands say what this instrument is
     assert "measures Mueller matrices" in run("polarimeter", instrument(table), code=2).stderr
+
+
+def test_commands_that_mean_one_colour_say_so(run):
+    assert (
+        "a camera of several colours" in run("plan", "white", "--instrument", "sony_imx250myr", code=2).stderr
+    )
+    assert "division of focal plane in colours" in run("polarimeter", "sony_imx250myr").stdout

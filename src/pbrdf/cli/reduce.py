@@ -132,7 +132,7 @@ def reduce(
             "--polarimeter: say what took the frames: the TOML file of the instrument, or a built-in one "
             "(docs/instruments.md)"
         )
-    instrument = open_instrument(polarimeter, mueller=True)
+    instrument = open_instrument(polarimeter, mueller=True, colors=True)
     if instrument.generator is not None:
         _reduce_mueller(
             frames,

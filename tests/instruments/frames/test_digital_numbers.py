@@ -171,6 +171,7 @@ def test_means_need_their_number():
         (np.array([5000, 32]), {"bits": 12}, "reads 5000, but 12 bits end at 4095: set bits = 13"),
         (np.array([40000, 33]), {"bits": 12}, "set bits = 16"),
         (np.array([40000, 32]), {"bits": 12}, 'set alignment = "left"'),
+        (picture() << 4, {"bits": 8}, 'set bits = 12 and alignment = "left"'),
         (np.array([5000.5]), {"bits": 12}, 'set bits = 13, .* or alignment = "left" if they are means'),
         (np.array([70000]), {"bits": 16}, "give numbers of 16 bits at most"),
         (np.array([-1], dtype=np.int16), {"bits": 12}, "a pixel reads -1"),

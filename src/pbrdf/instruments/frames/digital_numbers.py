@@ -192,8 +192,15 @@ def require_range(raw: np.ndarray, detector: Detector) -> None:
     if not largest > top:
         return
     shift = _CONTAINER - bits
-    if raw.dtype.kind != "f" and shift and trailing_zeros(raw) >= shift:
+    zeros = trailing_zeros(raw) if raw.dtype.kind != "f" and largest < 2**_CONTAINER else 0
+    if shift and zeros >= shift:
         remedy = f'all are multiples of {2**shift}, as of {bits} bits in the upper end of 16: set alignment = "left"'
+    elif zeros >= 2 and np.unique(raw).size >= _ENOUGH:
+        true = _CONTAINER - zeros
+        remedy = (
+            f"all are multiples of {2**zeros}, as of {true} bits in the upper end of 16: set bits = {true} and "
+            'alignment = "left", and the gain that goes with them,'
+        )
     elif largest < 2**_CONTAINER:
         fits = max(int(largest).bit_length(), bits + 1)
         remedy = f"set bits = {fits}, or what the camera has, and the gain that goes with it"
