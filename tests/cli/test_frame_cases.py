@@ -207,7 +207,7 @@ def test_readings_of_a_dual_rotating_retarder(run, tmp_path, instrument):
 
 @pytest.mark.slow
 def test_frames_of_a_dual_rotating_retarder(run, tmp_path, instrument):
-    """Frames s1 … s30: the matrix of a region, and the same from its repeats."""
+    """Frames called by the two angles: the matrix of a region, and the same from repeats in a stack."""
     polarimeter, generator = drr()
     signal = 1500 * np.einsum("ni,ij,nj->n", polarimeter.analyzer, SAMPLE, generator.stokes)
     detector = Detector(bits=12, gain=2.5, read_noise=6.0, offset=50.0)
@@ -215,7 +215,7 @@ def test_frames_of_a_dual_rotating_retarder(run, tmp_path, instrument):
     raw[:, 3, 0, 0] = 4095
     (tmp_path / "run").mkdir()
     for n in range(30):
-        Image.fromarray(raw[0, n]).save(tmp_path / "run" / f"p1_s{n + 1}.png")
+        Image.fromarray(raw[0, n]).save(tmp_path / "run" / f"p1_{6 * n}_{30 * n}.png")
     np.save(tmp_path / "p1.npy", raw)
     (tmp_path / "angles.csv").write_text("series,theta_i,theta_r\np1,30,30\n")
     table = f"{DRR}[detector]\nbits = 12\ngain = 2.5\nread_noise = 6\noffset = 50\n"

@@ -135,6 +135,30 @@ def test_repeated_exposures(tmp_path, kind):
     assert found.noise[0, 0] * SIZE**2 == pytest.approx(true, rel=0.1)
 
 
+def test_repeats_that_differ_as_a_whole(tmp_path):
+    """Light that changes by 1 % from picture to picture is named with its size; steady light is not."""
+    flicker = 1.0 + 0.01 * np.random.default_rng(5).normal(size=(40, 4))
+    signal = POLARIMETER.intensities(LIGHT) * flicker
+    even = np.broadcast_to(signal[:, :, None, None], (40, 4, SIZE, SIZE))
+    for raw, size in ((DETECTOR.expose(even, np.random.default_rng(0)), flicker.std()), (shots(40), None)):
+        np.save(tmp_path / "p.npy", raw)
+        frames = open_frames(tmp_path / "p.npy", instrument(pages="repeat, state"))
+        frames.read(0, 0, 9)
+        frames.read(0, 9, SIZE)
+        if size is None:
+            assert frames.notes == []
+            continue
+        (note,) = frames.notes
+        assert "differ by" in note
+        assert float(note.split("differ by ")[1].split("%")[0]) == pytest.approx(100 * size, rel=0.15)
+        stability = float(note.split("stability = ")[1].split()[0])
+        assert stability == pytest.approx(size / np.sqrt(40), rel=0.15)
+        steady = Instrument(POLARIMETER, DETECTOR, stability=0.01, frames={"pages": "repeat, state"})
+        told = open_frames(tmp_path / "p.npy", steady)
+        told.read(0, 0, SIZE)
+        assert told.notes == []
+
+
 def test_repeats_of_several_series_in_one_file(tmp_path):
     raw = np.stack([shots(3, seed=s) for s in range(2)])
     np.save(tmp_path / "five.npy", raw)

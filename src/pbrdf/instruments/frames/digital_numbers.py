@@ -22,6 +22,8 @@ __all__ = ["ConvertedFrames", "require_range", "trailing_zeros"]
 _CONTAINER = 16
 #: Numbers of at least so many sizes say that they are multiples of something by more than chance.
 _ENOUGH = 16
+#: Pictures that vary by so many times the variance of noise, and by more than this share, are not equally bright.
+_FLICKER, _STEADY = 10.0, 5e-4
 #: Pixels that a sample has at most, and that are counted at a time.
 _SAMPLE = 2**18
 #: As many pixels at the largest number are a pile, if they are so many times those of a number just below it.
@@ -42,6 +44,8 @@ class ConvertedFrames:
         Bits and alignment.
     exposures
         How many exposures each number is the mean of; None: not stated.
+    stability
+        Stated relative standard deviation of the source.
 
     Attributes
     ----------
@@ -54,13 +58,16 @@ class ConvertedFrames:
         If the numbers are not those of this detector.
     """
 
-    def __init__(self, frames: Frames, detector: Detector, exposures: int | None = None) -> None:
-        self._frames, self._detector = frames, detector
+    def __init__(
+        self, frames: Frames, detector: Detector, exposures: int | None = None, stability: float = 0.0
+    ) -> None:
+        self._frames, self._detector, self._stability = frames, detector, stability
         self.names, self.states = frames.names, frames.states
         self.rows, self.columns = frames.rows, frames.columns
         self.layers = layers_of(frames)
         self._levels = np.zeros(2**_CONTAINER, dtype=np.int64)
         self._said: list[str] = []
+        self._repeats: dict[int, _Repeats] = {}
         self.shift = self._found_shift(exposures)
 
     def read(self, series: int, first_row: int, last_row: int) -> np.ndarray:
@@ -70,14 +77,17 @@ class ConvertedFrames:
         except DataError as error:
             raise DataError(f"series {self.names[series]!r}: {error}") from None
         self._count(raw)
+        if raw.ndim == 4:
+            self._repeats.setdefault(series, _Repeats(raw.shape[:2])).add(raw)
         return raw
 
     @property
     def notes(self) -> list[str]:
         """What the numbers read so far betray, one sentence each."""
+        said = [*self._said, *self._flicker()]
         pile = _pile(self._levels, self._detector)
         if pile is None:
-            return list(self._said)
+            return said
         top, count = pile
         share = count / self._levels.sum()
         end = int(self._detector.saturation)
@@ -89,7 +99,7 @@ class ConvertedFrames:
             else f"full_scale = {top}"
         )
         return [
-            *self._said,
+            *said,
             f"{count} pixels ({share:.2%}) read exactly {top}, the largest number there is, and hardly any the numbers "
             f"just below: they are probably saturated, and not marked, as the detector is said to end at {end}. If so, "
             f"set {remedy} in [detector]",
@@ -98,6 +108,21 @@ class ConvertedFrames:
     def say(self, notes: list[str]) -> None:
         """Add to the notes."""
         self._said += notes
+
+    def _flicker(self) -> list[str]:
+        """Whether repeats differ as a whole by more than the noise of their pixels and what is stated of the source."""
+        found = [parts for repeats in self._repeats.values() for parts in repeats.variances(self._detector)]
+        if not found:
+            return []
+        whole, noise = np.mean(found, axis=0)
+        count = min(len(repeats.sums) for repeats in self._repeats.values())
+        share = float(np.sqrt(max(whole - noise, 0.0)))
+        if whole < _FLICKER * noise or share < _STEADY or share / np.sqrt(count) <= self._stability:
+            return []
+        return [
+            f"the repeats of a state differ by {share:.2%} as a whole, as of light that is not steady; that does not "
+            f"average away over a region: set stability = {share / np.sqrt(count):.2g} in [polarimeter]"
+        ]
 
     def _count(self, raw: np.ndarray) -> None:
         flat = raw.reshape(-1)
@@ -154,6 +179,27 @@ class ConvertedFrames:
         high = min(max(_SAMPLE // (frames.columns * frames.states * self.layers), 2), frames.rows)
         first = (frames.rows - high) // 2
         return frames.read(series, first, first + high)
+
+
+class _Repeats:
+    """Sums over the pictures of a series whose states were repeated: how much whole pictures differ."""
+
+    def __init__(self, shape: tuple[int, ...]) -> None:
+        self.sums = np.zeros(shape)
+        self.pixels = 0
+
+    def add(self, raw: np.ndarray) -> None:
+        self.sums += raw.sum(axis=(2, 3), dtype=float)
+        self.pixels += raw.shape[2] * raw.shape[3]
+
+    def variances(self, detector: Detector) -> list[tuple[float, float]]:
+        """Relative variance of the pictures of each state, and what the noise of pixels makes of it."""
+        means = self.sums / self.pixels
+        signal = means.mean(axis=0) - detector.black
+        lit = signal > 0.0
+        whole = means.var(axis=0, ddof=1)[lit] / signal[lit] ** 2
+        noise = detector.variance(means.mean(axis=0))[lit] / self.pixels / signal[lit] ** 2
+        return list(zip(whole.tolist(), noise.tolist(), strict=True))
 
 
 def shifted(raw: np.ndarray, shift: int) -> np.ndarray:

@@ -115,7 +115,7 @@ def open_frames(path: str | Path, instrument: Instrument) -> Frames:
         frames = _open_file(path, layout, states)
     detector, polarimeter = instrument.detector, instrument.polarimeter
     try:
-        converted = ConvertedFrames(frames, detector, layout.exposures)
+        converted = ConvertedFrames(frames, detector, layout.exposures, instrument.stability)
     except DataError as error:
         raise DataError(str(error) if str(error).startswith(str(path)) else f"{path}: {error}") from None
     if not mosaic:

@@ -77,7 +77,7 @@ def dual_rotating_retarder(
     diattenuation
         Of both.
     states
-        Names; s1, s2, … by default.
+        Names; the two angles in degrees by default, such as 5_25.
 
     Returns
     -------
@@ -97,7 +97,7 @@ def dual_rotating_retarder(
     light = diattenuator(polarizer, diattenuation)[:, 0]
     stokes = retarder(first, generator_retardance) @ (light / light[0])
     vectors = diattenuator(analyzer, diattenuation)[0] @ retarder(second, analyzer_retardance)
-    names = tuple(states) if states is not None else tuple(f"s{j + 1}" for j in range(first.size))
+    names = tuple(states) if states is not None else _names(first, second)
     settings = {
         "kind": "dual_rotating_retarder",
         "angles": np.round(np.rad2deg(np.stack([first, second], axis=1)), 10).tolist(),
@@ -114,6 +114,13 @@ def dual_rotating_retarder(
     }
     polarimeter = Polarimeter(vectors, names, "dual rotating retarder", details={"kind": "measured"})
     return polarimeter, Generator(stokes, settings=settings)
+
+
+def _names(first: np.ndarray, second: np.ndarray) -> tuple[str, ...]:
+    """The two angles in degrees, repeated pairs told apart by a number."""
+    pairs = np.round(np.rad2deg(np.stack([first, second], axis=1)), 4).tolist()
+    names = [f"{g:g}_{a:g}" for g, a in pairs]
+    return tuple(n if names.count(n) == 1 else f"{n}#{names[: i + 1].count(n)}" for i, n in enumerate(names))
 
 
 def solve_mueller(
