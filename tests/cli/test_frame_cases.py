@@ -4,14 +4,17 @@ anew, and dual rotating retarders."""
 from __future__ import annotations
 
 import csv
+import json
 
 import numpy as np
 import pytest
 from PIL import Image
 
+import pbrdf
 from pbrdf.data.readers import read
 from pbrdf.instruments.polarimeter.detector import Detector
 from pbrdf.instruments.polarimeter.mueller_polarimeter import dual_rotating_retarder
+from pbrdf.optics.elements import rotate_frame
 
 CELL = np.array([[90, 45], [135, 0]])
 
@@ -232,6 +235,40 @@ def test_frames_of_a_dual_rotating_retarder(run, tmp_path, instrument):
     assert ratio == pytest.approx(2.0, rel=0.1)
     # other commands say what this instrument is
     assert "measures Mueller matrices" in run("polarimeter", instrument(table), code=2).stderr
+
+
+@pytest.mark.slow
+def test_a_paint_behind_a_dual_rotating_retarder(run, tmp_path, instrument):
+    """Readings of a bundled paint by an instrument whose generator and analyser are turned: reduced and fitted, the
+    paint's parameters come back within their errors."""
+    paint = pbrdf.load_paint("matte-white-thick")
+    polarimeter, generator = drr()
+    turn_g, turn_a = np.pi / 2, np.pi / 4
+    rng = np.random.default_rng(0)
+    lines = []
+    for theta_i in (30, 45, 60):
+        for theta_r in range(0, 80, 12):
+            angles = np.deg2rad([theta_i, theta_r, 40.0])
+            M = np.cos(angles[0]) * np.asarray(paint.mueller(*angles)).reshape(4, 4)
+            seen = rotate_frame(turn_a) @ M @ rotate_frame(-turn_g)
+            exact = 5000 * np.einsum("ni,ij,nj->n", polarimeter.analyzer, seen, generator.stokes)
+            std = 0.002 * np.abs(exact) + 0.05
+            for k, value in enumerate(exact + std * rng.normal(size=30)):
+                lines.append(f"{theta_i},{theta_r},40,{6 * k},{30 * k},{value:.5f},{std[k]:.5f}")
+    header = "theta_i_deg,theta_r_deg,phi_deg,generator_deg,analyzer_deg,intensity,intensity_std"
+    (tmp_path / "paint.csv").write_text("\n".join([header, *lines]) + "\n")
+    table = f"{DRR}generator_reference_angle = 90\nreference_angle = 45\n"
+    run("reduce", str(tmp_path / "paint.csv"), "-p", instrument(table), "-o", str(tmp_path / "r"), "-q")
+    run(
+        "fit", str(tmp_path / "r" / "paint.csv"), "--nuisance", "gain", "--starts", "8", "-q", "-o",
+        str(tmp_path / "fit"),
+    )  # fmt: skip
+    record = json.loads((tmp_path / "fit" / "fit.json").read_text(encoding="utf-8"))
+    truth = dict(zip(("sigma", "n", "a", "k", "b", "t"), pbrdf.PAINTS["matte-white-thick"], strict=True))
+    for name, value in truth.items():
+        found = record["estimates"][name]
+        assert abs(found["value"] - value) < 4 * found["standard_error"] < 0.1 * abs(value), name
+    assert 0.7 < record["goodness"]["reduced_chi2"] < 1.4
 
 
 def test_commands_that_mean_one_colour_say_so(run):
