@@ -247,14 +247,14 @@ def test_a_paint_behind_a_dual_rotating_retarder(run, tmp_path, instrument):
     rng = np.random.default_rng(0)
     lines = []
     for theta_i in (30, 45, 60):
-        for theta_r in range(0, 80, 12):
-            angles = np.deg2rad([theta_i, theta_r, 40.0])
+        for theta_r in range(0, 80, 8):
+            angles = np.deg2rad([theta_i, theta_r, 0.0])
             M = np.cos(angles[0]) * np.asarray(paint.mueller(*angles)).reshape(4, 4)
             seen = rotate_frame(turn_a) @ M @ rotate_frame(-turn_g)
             exact = 5000 * np.einsum("ni,ij,nj->n", polarimeter.analyzer, seen, generator.stokes)
             std = 0.002 * np.abs(exact) + 0.05
             for k, value in enumerate(exact + std * rng.normal(size=30)):
-                lines.append(f"{theta_i},{theta_r},40,{6 * k},{30 * k},{value:.5f},{std[k]:.5f}")
+                lines.append(f"{theta_i},{theta_r},0,{6 * k},{30 * k},{value:.5f},{std[k]:.5f}")
     header = "theta_i_deg,theta_r_deg,phi_deg,generator_deg,analyzer_deg,intensity,intensity_std"
     (tmp_path / "paint.csv").write_text("\n".join([header, *lines]) + "\n")
     table = f"{DRR}generator_reference_angle = 90\nreference_angle = 45\n"
