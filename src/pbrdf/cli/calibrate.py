@@ -133,7 +133,7 @@ def calibrate(
     from pbrdf.report.instrument.calibration_summary import print_calibration, write_inputs
     from pbrdf.report.style import save_figure
 
-    instrument = open_instrument(polarimeter)
+    instrument = open_instrument(polarimeter, colors=True)
     table = read_input_table(inputs)
     found = open_frames(frames, instrument)
     chosen = open_regions(regions, roi or [])

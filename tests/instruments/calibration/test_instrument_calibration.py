@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,10 +11,13 @@ from pbrdf.errors import DataError
 from pbrdf.instruments.calibration.analyzer_calibration import reduced_inputs, standard_inputs
 from pbrdf.instruments.calibration.input_table import InputTable
 from pbrdf.instruments.calibration.instrument_calibration import calibrate_instrument
+from pbrdf.instruments.frames.color_frames import ColorFrames
 from pbrdf.instruments.frames.frames import ArrayFrames
+from pbrdf.instruments.polarimeter.color_filters import BAYER, ColorFilters
 from pbrdf.instruments.polarimeter.detector import Detector
 from pbrdf.instruments.polarimeter.instrument import Instrument
-from pbrdf.instruments.polarimeter.polarimeter import lcvr, rotating_polarizer
+from pbrdf.instruments.polarimeter.instrument_files import load_instrument, save_instrument
+from pbrdf.instruments.polarimeter.polarimeter import division_of_focal_plane, lcvr, rotating_polarizer
 from pbrdf.instruments.polarimeter.retardance_sets import retardance_set
 from pbrdf.instruments.reduction.stokes_image import PixelFlag
 from pbrdf.instruments.virtual.miscalibration import miscalibrated
@@ -168,3 +173,30 @@ def test_the_uncertainty_of_the_light_is_in_the_accuracy():
     found = reduced_inputs(stated.instrument.polarimeter.analyzer, nominal.intensities(linear))
     rms = np.sqrt(np.mean((found[1:3] / found[0] - linear[1:3]) ** 2))
     assert rms == pytest.approx(accuracy[0], rel=0.05)
+
+
+def test_one_colour_of_a_colour_camera(tmp_path):
+    """Polarisers that are weaker behind red: the calibration of that colour finds their vectors, is written with its
+    colour, and reads pictures with it; all colours at once are refused."""
+    rng = np.random.default_rng(0)
+    layout = np.deg2rad([[90.0, 45.0], [135.0, 0.0]])
+    weak, good = (division_of_focal_plane(layout, diattenuation=d) for d in (0.8, 0.97))
+    light = 3000.0 * standard_inputs(6, circular=False)
+    colors = {"R": weak, "G": good, "B": good}
+    pictures = []
+    for s in light.T:
+        cells = [[colors[c].intensities(s)[weak.mosaic] for c in row] for row in BAYER]
+        pictures.append(DETECTOR.expose(np.tile(np.block(cells), (8, 8)), rng))
+    pictures = ArrayFrames(np.stack(pictures)[:, None], tuple("abcdef"))
+    inputs = InputTable(tuple("abcdef"), light / 3000.0)
+    nominal = division_of_focal_plane(layout)
+    with pytest.raises(DataError, match='set color = "R"'):
+        both = replace(nominal, filters=ColorFilters())
+        calibrate_instrument(ColorFrames(pictures, both), Instrument(both, DETECTOR), inputs)
+    red = replace(nominal, filters=ColorFilters(only="R"))
+    made = calibrate_instrument(ColorFrames(pictures, red), Instrument(red, DETECTOR), inputs)
+    np.testing.assert_allclose(made.instrument.polarimeter.analyzer, weak.analyzer, atol=2e-3)
+    save_instrument(made.instrument, tmp_path / "red.toml")
+    again = load_instrument(tmp_path / "red.toml")
+    assert again.polarimeter.filters == ColorFilters(only="R")
+    np.testing.assert_array_equal(again.polarimeter.mosaic, nominal.mosaic)

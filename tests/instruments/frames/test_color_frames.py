@@ -216,3 +216,15 @@ def test_mistakes(tmp_path):
     instrument = file_of(tmp_path, 'kind = "preset"\npreset = "sony_imx250myr"')
     with pytest.raises(DataError, match="not made of whole periods of 2 × 2 cells of colours"):
         opened(tmp_path, picture()[:, :-2], instrument)
+
+
+def test_one_colour_alone(tmp_path):
+    """Series are called as the pictures, and hold what the colour's series holds."""
+    every = file_of(tmp_path, 'kind = "preset"\npreset = "sony_imx250myr"\ngreens = "apart"')
+    expected = found(opened(tmp_path, picture(), every), every)["f_G2"]
+    one = file_of(tmp_path, 'kind = "preset"\npreset = "sony_imx250myr"\ngreens = "apart"\ncolor = "G2"')
+    frames = opened(tmp_path, picture(), one)
+    assert frames.names == ("f",)
+    np.testing.assert_array_equal(found(frames, one)["f"], expected)
+    with pytest.raises(DataError, match="color is 'G2': use one of R, G, B; with greens"):
+        file_of(tmp_path, 'kind = "preset"\npreset = "sony_imx250myr"\ncolor = "G2"')

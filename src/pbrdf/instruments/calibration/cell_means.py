@@ -140,16 +140,12 @@ def cell_means_of_frames(
     used = None
     if regions:
         used = np.any([region.mask(0, frames.rows, frames.columns) for region in regions], axis=0)
-    if color_cells_of(frames, 0).size != (1, 1):
-        raise DataError(
-            f"{instrument.polarimeter.name}: a camera of several colours is not calibrated as a whole: calibrate what "
-            "is behind one colour with the other cells cut away"
-        )
+    color = color_cells_of(frames, 0)
     corrections = Corrections.of(instrument, frames)
-    pixels = corrections.pixels(instrument, slice(0, frames.rows))
+    pixels = corrections.pixels(instrument, slice(0, frames.rows * color.size[0])).part(color)
 
     def read(k: int) -> Reading:
-        raw = frames.read(k, 0, frames.rows)
+        raw = color.parts(frames.read(k, 0, frames.rows))[0]
         try:
             require_range(raw, instrument.detector)
         except DataError as error:

@@ -198,6 +198,12 @@ def calibrate_instrument(
     FitError
         If the fit of the settings does not converge.
     """
+    filters = instrument.polarimeter.filters
+    if filters is not None and (filters.only is None or len(filters.places[filters.only]) > 1):
+        raise DataError(
+            f"{instrument.polarimeter.name}: each colour is calibrated for itself, since each sees light through other "
+            'polarisers: set color = "R" in [polarimeter], then the others (greens = "apart" gives G1 and G2)'
+        )
     table = inputs.rows(frames.names)
     out: Sequence[int] | Literal["each"] = "each"
     if not isinstance(held_out, str):
@@ -252,6 +258,7 @@ def calibrate_instrument(
             mosaic=polarimeter.mosaic,
         )
     made = found.polarimeter
+    made = replace(made, filters=filters)
     shown = polarimeter.accuracy if found.accuracy is None else made.accuracy
     known = table.accuracy
     made = made.with_accuracy(

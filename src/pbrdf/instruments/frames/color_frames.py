@@ -30,7 +30,8 @@ class ColorFrames:
     Attributes
     ----------
     sources
-        For each series the name of the picture, that of the colour, and its wavelength (nm) if it is known.
+        For each series the name of the picture, that of the colour, and its wavelength (nm) if it is known; empty if
+        one colour alone is used, and series are called as pictures.
 
     Raises
     ------
@@ -50,10 +51,12 @@ class ColorFrames:
                 f"{tall} × {wide} cells of colours"
             )
         self._cells = [ColorCells((tall, wide), places) for places in filters.places.values()]
-        self.sources = tuple(
+        self.sources: tuple[tuple[str, str, float | None], ...] = tuple(
             (name, color, filters.wavelength(color)) for name in pictures.names for color in filters.places
         )
         self.names = tuple(f"{name}_{color}" for name, color, _ in self.sources)
+        if filters.only is not None:
+            self.names, self.sources = pictures.names, ()
         self.states = polarimeter.size
         self.rows, self.columns = self._mosaic.rows // tall, self._mosaic.columns // wide
         self.layers = tall * wide * layers_of(pictures)

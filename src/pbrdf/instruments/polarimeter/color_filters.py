@@ -14,7 +14,7 @@ A colour is a measurement of its own: what is computed from a cell is never mixe
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -38,6 +38,8 @@ class ColorFilters:
         Nominal wavelength of each colour, nanometres; empty where they are not stated.
     apart
         Keep cells of the same colour apart (G1, G2) rather than average them.
+    only
+        The one series of :attr:`places` that is used; None: all.
 
     Raises
     ------
@@ -48,6 +50,7 @@ class ColorFilters:
     layout: tuple[tuple[str, ...], ...] = BAYER
     wavelengths: Mapping[str, float] = field(default_factory=dict)
     apart: bool = False
+    only: str | None = None
 
     def __post_init__(self) -> None:
         widths = {len(row) for row in self.layout}
@@ -58,6 +61,12 @@ class ColorFilters:
             raise DataError(
                 f"wavelengths are given of {', '.join(self.wavelengths)}, but the colours are "
                 f"{', '.join(sorted(colors))}: give one of each"
+            )
+        if self.only is not None and self.only not in self.places:
+            known = ", ".join(replace(self, only=None).places)
+            raise DataError(
+                f"color is {self.only!r}: use one of {known}"
+                + ("" if self.apart else '; with greens = "apart" their cells are colours of their own')
             )
         for name, value in self.wavelengths.items():
             if not (np.isfinite(value) and value > 0.0):
@@ -75,13 +84,15 @@ class ColorFilters:
         for y, row in enumerate(self.layout):
             for x, name in enumerate(row):
                 found.setdefault(name, []).append((y, x))
-        if not self.apart:
-            return {name: tuple(cells) for name, cells in found.items()}
-        return {
-            name if len(cells) == 1 else f"{name}{k + 1}": (cell,)
-            for name, cells in found.items()
-            for k, cell in enumerate(cells)
-        }
+        if self.apart:
+            named = {
+                name if len(cells) == 1 else f"{name}{k + 1}": (cell,)
+                for name, cells in found.items()
+                for k, cell in enumerate(cells)
+            }
+        else:
+            named = {name: tuple(cells) for name, cells in found.items()}
+        return {name: cells for name, cells in named.items() if self.only in (None, name)}
 
     def wavelength(self, label: str) -> float | None:
         """Nominal wavelength of one of :attr:`places`, nanometres."""

@@ -35,7 +35,7 @@ from pbrdf.instruments.polarimeter.retardance_sets import retardance_set
 __all__ = ["load_instrument", "save_instrument"]
 
 _COMMON = ("kind", "name", "states", "accuracy", "reference_angle", "stability")
-_COLORS = ("colors", "wavelengths", "greens")
+_COLORS = ("colors", "wavelengths", "greens", "color")
 _KINDS: dict[str, tuple[str, ...]] = {
     "lcvr": ("axes", "retardances", "set", "analyzer", "diattenuation", "band"),
     "rotating_retarder": ("angles", "retardance", "analyzer", "diattenuation", "band"),
@@ -153,6 +153,8 @@ def save_instrument(instrument: Instrument, path: str | Path) -> None:
             table["wavelengths"] = dict(polarimeter.filters.wavelengths)
         if polarimeter.filters.apart:
             table["greens"] = "apart"
+        if polarimeter.filters.only is not None:
+            table["color"] = polarimeter.filters.only
     detector = {key: getattr(instrument.detector, key) for key in _DETECTOR}
     detector = {key: value for key, value in detector.items() if value is not None}
     frames = dict(instrument.frames)
@@ -394,6 +396,8 @@ def _filters(table: _Table, default: ColorFilters | None) -> ColorFilters:
         made = replace(made, wavelengths={name: float(v) for name, v in content.items()})
     if "greens" in table.content:
         made = replace(made, apart=table.choice("greens", ("joined", "apart")) == "apart")
+    if "color" in table.content:
+        made = replace(made, only=table.text("color"))
     return made
 
 
