@@ -84,14 +84,12 @@ class ColorFilters:
         for y, row in enumerate(self.layout):
             for x, name in enumerate(row):
                 found.setdefault(name, []).append((y, x))
-        if self.apart:
-            named = {
-                name if len(cells) == 1 else f"{name}{k + 1}": (cell,)
-                for name, cells in found.items()
-                for k, cell in enumerate(cells)
-            }
-        else:
-            named = {name: tuple(cells) for name, cells in found.items()}
+        named: dict[str, tuple[tuple[int, int], ...]] = {}
+        for name, cells in found.items():
+            if not self.apart or len(cells) == 1:
+                named[name] = tuple(cells)
+            else:
+                named |= {f"{name}{k + 1}": (cell,) for k, cell in enumerate(cells)}
         return {name: cells for name, cells in named.items() if self.only in (None, name)}
 
     def wavelength(self, label: str) -> float | None:
