@@ -276,3 +276,41 @@ def test_commands_that_mean_one_colour_say_so(run):
         "a camera of several colours" in run("plan", "white", "--instrument", "sony_imx250myr", code=2).stderr
     )
     assert "division of focal plane in colours" in run("polarimeter", "sony_imx250myr").stdout
+
+
+@pytest.mark.slow
+def test_the_files_of_the_cases(run, tmp_path, measured, instrument):
+    """The strangers' files themselves, where they are."""
+    left = measured("../cases/H1-twelve-bits-left-aligned/f.png")
+    run("reduce", left, "-p", left.with_name("imx12.toml"), "-o", "h", "--maps", "none", "--no-pictures")
+    assert rows(tmp_path / "h" / "summary.csv")[0]["saturated"] == "64"
+    run("reduce", left, "-p", left.with_name("imx16.toml"), "-o", "h16", code=2)
+    means = measured("../cases/L1-averaged-frames-in-floats/f.npy")
+    text = means.with_name("rp.toml").read_text(encoding="utf-8")
+    assert "exposures = 100" in run("reduce", means, "-p", means.with_name("rp.toml"), code=2).stderr
+    run(
+        "reduce",
+        means,
+        "-p",
+        instrument(f"{text}\nexposures = 100\n"),
+        "-o",
+        "l",
+        "--maps",
+        "none",
+        "--no-pictures",
+    )
+    (row,) = rows(tmp_path / "l" / "summary.csv")
+    assert (float(row["I"]), float(row["dolp"])) == (
+        pytest.approx(3000, abs=1),
+        pytest.approx(0.316, abs=1e-3),
+    )
+    color = measured("../cases/L3-colour-polarisation-mosaic/f.png")
+    for name in ("imx12.toml", "myr.toml"):
+        done = run(
+            "reduce", color, "-p", color.with_name(name), "-o", name[:-5], "--maps", "none", "--no-pictures"
+        )
+        assert "neighbouring cells of polarisers alternate" in done.stderr
+    preset = color.with_name("imx12.toml").read_text(encoding="utf-8").replace("mzr", "myr")
+    run("reduce", color, "-p", instrument(preset), "-o", "c", "--maps", "none", "--no-pictures")
+    found = [float(row["dolp"]) for row in rows(tmp_path / "c" / "summary.csv")]
+    assert found == pytest.approx([0.4, 0.2, 0.6], abs=2e-3)
