@@ -89,6 +89,19 @@ def test_few_numbers_prove_nothing():
     assert trailing_zeros(np.zeros(3, int)) == 16
 
 
+def test_multiples_that_only_the_whole_picture_shows():
+    """The rows that are looked at first are dark; the others hold few numbers at a time, all multiples of 16."""
+    numbers = np.zeros((1200, 512), np.uint16)
+    numbers[:40] = 16 * np.random.default_rng(0).integers(0, 200, (40, 512))
+    frames = frames_of(numbers, bits=12)
+    assert (frames.shift, frames.notes) == (0, [])
+    read(frames)
+    assert "all numbers are multiples of 16, and were read as they stand" in frames.notes[0]
+    right = frames_of(numbers, bits=12, alignment="right")
+    read(right)
+    assert right.notes == []
+
+
 def test_a_dark_series_first_does_not_decide():
     dim = np.zeros((16, 16), np.uint16)
     run = np.stack([dim, picture() << 4, dim])[:, None]

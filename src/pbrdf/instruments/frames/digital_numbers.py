@@ -84,7 +84,7 @@ class ConvertedFrames:
     @property
     def notes(self) -> list[str]:
         """What the numbers read so far betray, one sentence each."""
-        said = [*self._said, *self._flicker()]
+        said = [*self._said, *self._unseen_alignment(), *self._flicker()]
         pile = _pile(self._levels, self._detector)
         if pile is None:
             return said
@@ -108,6 +108,20 @@ class ConvertedFrames:
     def say(self, notes: list[str]) -> None:
         """Add to the notes."""
         self._said += notes
+
+    def _unseen_alignment(self) -> list[str]:
+        """Whether all numbers turned out to be multiples of something that the sample was too small to show."""
+        held = np.flatnonzero(self._levels)
+        if self.shift or self._detector.alignment is not None or held.size < _ENOUGH or held[-1] < 2**8:
+            return []
+        zeros = trailing_zeros(held.astype(np.uint32))
+        if zeros < max(_CONTAINER - self._detector.bits, 2):
+            return []
+        true = _CONTAINER - zeros
+        return [
+            f"all numbers are multiples of {2**zeros}, and were read as they stand: if they are {true} bits in the upper "
+            f'end of 16, set bits = {true} and alignment = "left" in [detector], else alignment = "right"'
+        ]
 
     def _flicker(self) -> list[str]:
         """Whether repeats differ as a whole by more than the noise of their pixels and what is stated of the source."""

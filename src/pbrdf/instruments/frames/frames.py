@@ -94,7 +94,9 @@ class ArrayFrames:
     Attributes
     ----------
     array
-        Raw digital numbers, whole or means of exposures with decimals, shape (M, N, rows, columns).
+        Raw digital numbers of the converter, whole or means of exposures with decimals, shape (M, N, rows, columns).
+        Numbers in the upper end of 16 bits are made such by
+        :class:`~pbrdf.instruments.frames.digital_numbers.ConvertedFrames` around these frames.
     names
         Of the M series; "1", "2", … by default.
 
