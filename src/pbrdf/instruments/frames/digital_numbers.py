@@ -119,8 +119,8 @@ class ConvertedFrames:
             return []
         true = _CONTAINER - zeros
         return [
-            f"all numbers are multiples of {2**zeros}, and were read as they stand: if they are {true} bits in the upper "
-            f'end of 16, set bits = {true} and alignment = "left" in [detector], else alignment = "right"'
+            f"all numbers are multiples of {2**zeros}, and were read as they stand: if they are {true} bits in the "
+            f'upper end of 16, set bits = {true} and alignment = "left" in [detector], else alignment = "right"'
         ]
 
     def _flicker(self) -> list[str]:
