@@ -127,12 +127,13 @@ def calibrate(
     from pbrdf.instruments.calibration.input_table import read_input_table
     from pbrdf.instruments.calibration.instrument_calibration import calibrate_instrument
     from pbrdf.instruments.frames.frame_files import open_frames
+    from pbrdf.instruments.frames.frames import notes_of
     from pbrdf.instruments.polarimeter.instrument_files import save_instrument
     from pbrdf.report.instrument.calibration_figure import calibration_figure
     from pbrdf.report.instrument.calibration_summary import print_calibration, write_inputs
     from pbrdf.report.style import save_figure
 
-    instrument = open_instrument(polarimeter)
+    instrument = open_instrument(polarimeter, colors=True)
     table = read_input_table(inputs)
     found = open_frames(frames, instrument)
     chosen = open_regions(regions, roi or [])
@@ -157,7 +158,7 @@ def calibrate(
         written.append(target.with_suffix(".png"))
         save_figure(calibration_figure(made, target.stem), written[-1])
     save_instrument(made.instrument, target)
-    for warning in made.warnings:
+    for warning in [*made.warnings, *notes_of(found)]:
         warn(warning)
     if quiet:
         print(target)

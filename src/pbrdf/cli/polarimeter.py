@@ -52,7 +52,7 @@ def polarimeter(
         from pbrdf.report.instrument.polarimeter_summary import print_polarimeter
 
         assert source is not None
-        print_polarimeter(open_instrument(source), output_console())
+        print_polarimeter(open_instrument(source, colors=True), output_console())
         return
     if output is not None:
         if output.suffix.lower() != ".toml":

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 import re
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pbrdf.cli.console import output_console, progress_bar
+from pbrdf.cli.console import output_console, progress_bar, warn
 from pbrdf.cli.instruments import open_instrument
 from pbrdf.cli.options import (
     DarkLevel,
@@ -23,8 +23,14 @@ from pbrdf.cli.regions import open_regions
 from pbrdf.cli.values import number
 from pbrdf.errors import PbrdfError
 
+if TYPE_CHECKING:
+    from pbrdf.instruments.polarimeter.instrument import Instrument
+    from pbrdf.instruments.reduction.regions import Region
+
 __all__ = ["reduce"]
 
+#: Extensions of tables of readings.
+_TABLES = (".csv", ".tsv", ".txt", ".dat")
 _UNITS = {"": 1, "K": 10**3, "M": 10**6, "G": 10**9, "T": 10**12}
 #: Less memory than this holds no block of a large picture.
 _LEAST_MEMORY = 1_000_000
@@ -36,10 +42,11 @@ def reduce(
         typer.Argument(
             metavar="FRAMES",
             help="Raw frames: a folder of PNG, TIFF or NPY files (one a state, called SERIES_STATE, or a folder a "
-            "series), a TIFF or NPY stack, netCDF, Zarr, or mosaic pictures.",
+            "series), a TIFF or NPY stack, raw camera files, netCDF, Zarr, or mosaic pictures; or a CSV table of "
+            "readings of a dual rotating retarder; or a rendered Stokes picture (OpenEXR, without --polarimeter).",
         ),
     ],
-    polarimeter: Annotated[str, polarimeter_option()],
+    polarimeter: Annotated[str | None, polarimeter_option()] = None,
     output: Annotated[
         Path | None,
         output_option("Folder for the results.", show_default="<frames>-reduced"),
@@ -101,9 +108,8 @@ def reduce(
         raise PbrdfError(f"--maps {maps!r}: choose nc, zarr or none")
     if datasets not in ("csv", "nc"):
         raise PbrdfError(f"--datasets {datasets!r}: choose csv or nc")
-    from pbrdf.files.atomic import require_writable_folder
     from pbrdf.instruments.frames.frame_files import open_frames
-    from pbrdf.instruments.frames.frames import ChosenSeries, Frames
+    from pbrdf.instruments.frames.frames import ChosenSeries, Frames, notes_of
     from pbrdf.instruments.goniometer.angle_table import read_angles
     from pbrdf.report.reduction.folder import Wanted, write_reduction
 
@@ -111,13 +117,41 @@ def reduce(
         from pbrdf.data.formats.zarr_folder import require_zarr
 
         require_zarr(Path("stokes.zarr"))
-    instrument = open_instrument(polarimeter)
+    if frames.suffix.lower() == ".exr":
+        _reduce_pictures(
+            frames,
+            output=output,
+            regions=open_regions(regions, roi or []),
+            angles=angles,
+            datasets=datasets,
+            quiet=quiet,
+        )
+        return
+    if polarimeter is None:
+        raise PbrdfError(
+            "--polarimeter: say what took the frames: the TOML file of the instrument, or a built-in one "
+            "(docs/instruments.md)"
+        )
+    instrument = open_instrument(polarimeter, mueller=True, colors=True)
+    if instrument.generator is not None:
+        _reduce_mueller(
+            frames,
+            instrument,
+            output=output,
+            regions=open_regions(regions, roi or []),
+            angles=angles,
+            series=series,
+            datasets=datasets,
+            memory=memory,
+            quiet=quiet,
+        )
+        return
     found: Frames = open_frames(frames, instrument)
     table = None if angles is None else read_angles(angles)
     if series is not None:
         names = [name.strip() for name in series.split(",") if name.strip()]
         found = ChosenSeries(found, names)
-        table = None if table is None else table.rows(names)
+        table = None if table is None else table.for_frames(found).rows(names)
     chosen = open_regions(regions, roi or [])
     if table is not None and not chosen:
         raise PbrdfError(
@@ -125,14 +159,7 @@ def reduce(
             f"--roi sample=0:{found.columns},0:{found.rows} for all of it"
         )
     plain = frames.resolve()
-    folder = output or Path(
-        f"{plain.name if plain.is_dir() and plain.suffix != '.zarr' else plain.stem}-reduced"
-    )
-    if folder.resolve() == plain:
-        raise PbrdfError(
-            f"--output {folder}: the frames are in this folder; choose another one for the results"
-        )
-    require_writable_folder(folder)
+    folder = _folder(frames, output)
     wanted = Wanted(None if maps == "none" else maps, pictures, chosen, table, f".{datasets}")
     with progress_bar(f"Reducing {frames}", quiet) as progress:
         result = write_reduction(
@@ -146,6 +173,8 @@ def reduce(
             max_memory=memory,
             progress=progress,
         )
+    for note in notes_of(found):
+        warn(note)
     if quiet:
         print(folder)
         return
@@ -160,6 +189,123 @@ def reduce(
     shown = {name: means for name, means in result.averages.items() if name in chosen} or result.averages
     print_averages(shown, found.names, console)
     console.print(f"\nWritten to {folder}/: {', '.join(path.name for path in result.files)}", markup=False)
+
+
+def _folder(frames: Path, output: Path | None) -> Path:
+    """Where the results go, checked to be writable and not to be where the frames are."""
+    from pbrdf.files.atomic import require_writable_folder
+
+    plain = frames.resolve()
+    folder = output or Path(
+        f"{plain.name if plain.is_dir() and plain.suffix != '.zarr' else plain.stem}-reduced"
+    )
+    if folder.resolve() == plain:
+        raise PbrdfError(
+            f"--output {folder}: the frames are in this folder; choose another one for the results"
+        )
+    require_writable_folder(folder)
+    return folder
+
+
+def _reduce_mueller(
+    frames: Path,
+    instrument: Instrument,
+    *,
+    output: Path | None,
+    regions: dict[str, Region],
+    angles: Path | None,
+    series: str | None,
+    datasets: str,
+    memory: int,
+    quiet: bool,
+) -> None:
+    """Mueller matrices from frames or from a table of readings."""
+    from pbrdf.instruments.frames.frame_files import open_frames
+    from pbrdf.instruments.frames.frames import ChosenSeries, Frames, notes_of
+    from pbrdf.instruments.goniometer.angle_table import read_angles
+    from pbrdf.instruments.reduction.mueller_reduction import mueller_of_frames, mueller_of_table
+    from pbrdf.instruments.reduction.regions import Rectangle
+    from pbrdf.report.reduction.folder import WHOLE_PICTURE
+    from pbrdf.report.reduction.mueller_folder import mueller_warnings, print_mueller, write_mueller
+
+    table = None if angles is None else read_angles(angles)
+    notes: list[str] = []
+    if frames.suffix.lower() in _TABLES:
+        if regions or series is not None:
+            raise PbrdfError(
+                f"{frames}: a table of readings has no regions, and all of its series are reduced"
+            )
+        means = mueller_of_table(frames, instrument)
+        table = means.angles if table is None else table
+        found = {frames.stem: means}
+    else:
+        opened: Frames = open_frames(frames, instrument)
+        if series is not None:
+            names = [name.strip() for name in series.split(",") if name.strip()]
+            opened = ChosenSeries(opened, names)
+            table = None if table is None else table.rows(names)
+        if table is not None and not regions:
+            raise PbrdfError(
+                f"--angles: say which part of the picture is the sample, for example "
+                f"--roi sample=0:{opened.columns},0:{opened.rows} for all of it"
+            )
+        chosen = regions or {WHOLE_PICTURE: Rectangle(0, opened.columns, 0, opened.rows)}
+        with progress_bar(f"Reducing {frames}", quiet) as progress:
+            found = mueller_of_frames(opened, instrument, chosen, max_memory=memory, progress=progress)
+        notes = notes_of(opened)
+    folder = _folder(frames, output)
+    files = write_mueller(
+        found, instrument, folder, angles=table, suffix=f".{datasets}", name=frames.resolve().name
+    )
+    for note in [*mueller_warnings(found), *notes]:
+        warn(note)
+    if quiet:
+        print(folder)
+        return
+    console = output_console()
+    print_mueller(found, console)
+    console.print(f"\nWritten to {folder}/: {', '.join(path.name for path in files)}", markup=False)
+
+
+def _reduce_pictures(
+    path: Path,
+    *,
+    output: Path | None,
+    regions: dict[str, Region],
+    angles: Path | None,
+    datasets: str,
+    quiet: bool,
+) -> None:
+    """Means of regions of a rendered picture."""
+    from pbrdf.instruments.goniometer.angle_table import read_angles
+    from pbrdf.instruments.reduction.regions import Rectangle
+    from pbrdf.rendering.picture_regions import open_series
+    from pbrdf.rendering.variant import start_mitsuba
+    from pbrdf.report.reduction.folder import WHOLE_PICTURE, write_picture_reduction
+    from pbrdf.report.reduction.summary import print_averages
+
+    if not path.is_file():
+        raise PbrdfError(f"{path}: there is no such file")
+    start_mitsuba()
+    series = open_series([path])
+    rows, columns = series.shape
+    table = None if angles is None else read_angles(angles)
+    if table is not None and not regions:
+        raise PbrdfError(
+            f"--angles: say which part of the picture is the sample, for example --roi sample=0:{columns},0:{rows} for "
+            "all of it"
+        )
+    chosen = regions or {WHOLE_PICTURE: Rectangle(0, columns, 0, rows)}
+    result = write_picture_reduction(
+        series, chosen, _folder(path, output), angles=table, suffix=f".{datasets}", name=path.name
+    )
+    if quiet:
+        print(result.files[0].parent)
+        return
+    console = output_console()
+    print_averages(result.averages, series.names, console)
+    files = ", ".join(file.name for file in result.files)
+    console.print(f"\nWritten to {result.files[0].parent}/: {files}", markup=False)
 
 
 def memory_size(text: str, option: str) -> int:

@@ -20,7 +20,10 @@ from pbrdf.files.atomic import atomic_file
 from pbrdf.optics.elements import diattenuator
 from pbrdf.optics.stokes import aolp, dolp
 
-__all__ = ["StokesPicture", "polarizer_name", "read_exr", "write_exr"]
+__all__ = ["StokesPicture", "polarizer_name", "read_exr", "read_exr_colors", "write_exr"]
+
+#: Layers of Mitsuba's ``stokes`` integrator, ``S0.R`` and so on.
+_COLORS = ("R", "G", "B")
 
 _CONVENTION = (
     "S0..S3 = I, Q, U, V; Q > 0 horizontal, U > 0 at +45 deg, V > 0 left circular (counterclockwise for the camera); "
@@ -122,7 +125,34 @@ def polarizer_name(angle: float) -> str:
 
 
 def read_exr(path: Path) -> StokesPicture:
-    """Read a picture that :func:`write_exr` wrote.
+    """Read a picture that :func:`write_exr` wrote, or one of Mitsuba's without colours.
+
+    Raises
+    ------
+    DataError
+        If the file cannot be read, lacks the layers, or has several colours (:func:`read_exr_colors`).
+    """
+    colors = read_exr_colors(path)
+    if len(colors) > 1:
+        raise DataError(
+            f"{path}: it has the colours {', '.join(colors)}, each with its own Stokes vectors: "
+            "pbrdf.rendering.picture.read_exr_colors reads them apart"
+        )
+    return next(iter(colors.values()))
+
+
+def read_exr_colors(path: Path) -> dict[str, StokesPicture]:
+    """Read a Stokes picture, each colour apart.
+
+    Two kinds of files: those of :func:`write_exr`, and those of Mitsuba's integrator ``stokes`` with the layers
+    ``S0.R``, ``S0.G``, ``S0.B`` … ``S3.B``. Mitsuba's axes are those of the picture, as ours, but its S3 is positive
+    for right circular light: the sign is changed here.
+
+    Returns
+    -------
+    dict of str to StokesPicture
+        By the name of the colour, ``"R"``, ``"G"``, ``"B"``; ``""`` alone where there is one, or where Mitsuba has put
+        a single wavelength into all three alike.
 
     Raises
     ------
@@ -137,6 +167,8 @@ def read_exr(path: Path) -> StokesPicture:
         raise DataError(f"{path}: cannot be read as a picture: {' '.join(str(error).split())}") from error
     names = [channel.name for channel in bitmap.struct_()]
     values = np.array(bitmap, dtype=float)
+    if {f"S{i}.{color}" for i in range(4) for color in _COLORS} <= set(names):
+        return _mitsuba_colors(names, values, bitmap.metadata())
     missing = [f"S{i}.Y" for i in range(4) if f"S{i}.Y" not in names]
     if missing:
         raise DataError(f"{path}: there is no layer {missing[0]}; the file has {', '.join(names)}")
@@ -145,4 +177,18 @@ def read_exr(path: Path) -> StokesPicture:
     if "S0.std" in names:
         std = np.stack([values[..., names.index(f"S{i}.std")] for i in range(4)])
     header: Any = bitmap.metadata()
-    return StokesPicture(stokes, std, {name: header[name] for name in header})
+    return {"": StokesPicture(stokes, std, {name: header[name] for name in header})}
+
+
+def _mitsuba_colors(names: Sequence[str], values: np.ndarray, header: Any) -> dict[str, StokesPicture]:
+    """Pictures of Mitsuba's layers in this project's convention."""
+    attrs = {name: header[name] for name in header}
+    found = {}
+    for color in _COLORS:
+        stokes = np.stack([values[..., names.index(f"S{i}.{color}")] for i in range(4)])
+        stokes[3] *= -1.0
+        found[color] = StokesPicture(stokes, np.full_like(stokes, np.nan), attrs)
+    first, *others = (picture.stokes for picture in found.values())
+    if all(np.array_equal(first, other, equal_nan=True) for other in others):
+        return {"": found["R"]}
+    return found

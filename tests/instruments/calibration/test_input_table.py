@@ -119,3 +119,45 @@ def test_rows_must_be_those_of_the_frames():
         table.rows(("a", "c"))
     with pytest.raises(DataError, match="rows for 'b', of which there are no frames"):
         table.rows(("a",))
+
+
+def test_uncertainty_of_the_light(tmp_path):
+    """Against differences of the ellipse itself; a polariser known to 1.5° is 2·1.5°/√2 = 3.7 % of Q and U."""
+    table = read(
+        tmp_path,
+        "series,angle_deg,ellipticity_deg,dop,angle_std_deg,ellipticity_std_deg",
+        "a,20,0,1,1.5,",
+        "b,70,30,0.8,,2",
+        "c,110,-10,0.5,0.5,1",
+    )
+    step = 1e-6
+    rows = [(20, 0, 1, 1.5, 0), (70, 30, 0.8, 0, 2), (110, -10, 0.5, 0.5, 1)]
+    for k, (angle, chi, dop, angle_std, chi_std) in enumerate(rows):
+        psi, chi = np.deg2rad(angle), np.deg2rad(chi)
+        by_angle = (ellipse(psi + step, chi, dop) - ellipse(psi - step, chi, dop))[1:] / (2 * step)
+        by_chi = (ellipse(psi, chi + step, dop) - ellipse(psi, chi - step, dop))[1:] / (2 * step)
+        expected = np.hypot(by_angle * np.deg2rad(angle_std), by_chi * np.deg2rad(chi_std))
+        np.testing.assert_allclose(table.ratio_std[:, k], expected, atol=1e-9)
+    linear = read(tmp_path, "series,angle_deg,angle_std_deg", "a,0,1.5", "b,50,1.5", "c,100,1.5")
+    assert linear.accuracy == (pytest.approx(2 * np.deg2rad(1.5) / np.sqrt(2)), 0.0)
+
+
+def test_light_that_is_not_polarised_or_dark_does_not_dilute_the_uncertainty(tmp_path):
+    """Half polarised light turned by σ errs by half as much, for polarisation that is half as large."""
+    lines = ["series,angle_deg,dop,angle_std_deg,intensity", "a,0,1,2,1", "b,60,1,2,1", "c,120,1,2,1"]
+    alone = read(tmp_path, *lines).accuracy
+    more = read(tmp_path, *lines, "natural,,0,2,1", "half,30,0.5,2,3", "dark,0,1,2,0").accuracy
+    assert more == pytest.approx(alone)
+
+
+def test_uncertainty_of_degrees_and_of_stokes_vectors(tmp_path):
+    table = read(tmp_path, "series,angle_deg,dop_std,dolp_std", "a,0,0.02,", "b,45,,0.03")
+    np.testing.assert_allclose(table.ratio_std.T, [[0.02, 0, 0], [0, 0.03, 0]], atol=1e-15)
+    table = read(tmp_path, "series,I,Q,U,V,Q_std,V_std", "a,2,1,0,0,0.1,0.02", "b,2,0,1,0,0.1,")
+    np.testing.assert_allclose(table.ratio_std.T, [[0.05, 0, 0.01], [0.05, 0, 0]])
+    write_input_table(table, tmp_path / "again.csv")
+    np.testing.assert_allclose(read_input_table(tmp_path / "again.csv").ratio_std, table.ratio_std)
+    with pytest.raises(DataError, match=r"'angle_sd_deg' is not known \(perhaps 'angle_std_deg'\)"):
+        read(tmp_path, "series,angle_deg,angle_sd_deg", "a,0,1")
+    with pytest.raises(DataError, match="-1 is not a number of 0 or more"):
+        read(tmp_path, "series,angle_deg,angle_std_deg", "a,0,-1")

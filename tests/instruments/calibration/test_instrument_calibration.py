@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from pbrdf.errors import DataError
-from pbrdf.instruments.calibration.analyzer_calibration import standard_inputs
+from pbrdf.instruments.calibration.analyzer_calibration import reduced_inputs, standard_inputs
 from pbrdf.instruments.calibration.input_table import InputTable
 from pbrdf.instruments.calibration.instrument_calibration import calibrate_instrument
+from pbrdf.instruments.frames.color_frames import ColorFrames
 from pbrdf.instruments.frames.frames import ArrayFrames
+from pbrdf.instruments.polarimeter.color_filters import BAYER, ColorFilters
 from pbrdf.instruments.polarimeter.detector import Detector
 from pbrdf.instruments.polarimeter.instrument import Instrument
-from pbrdf.instruments.polarimeter.polarimeter import lcvr, rotating_polarizer
+from pbrdf.instruments.polarimeter.instrument_files import load_instrument, save_instrument
+from pbrdf.instruments.polarimeter.polarimeter import division_of_focal_plane, lcvr, rotating_polarizer
 from pbrdf.instruments.polarimeter.retardance_sets import retardance_set
 from pbrdf.instruments.reduction.stokes_image import PixelFlag
 from pbrdf.instruments.virtual.miscalibration import miscalibrated
@@ -143,3 +148,55 @@ def test_refusals():
     raw[1] = 260
     with pytest.raises(DataError, match="do not grow brighter"):
         calibrate_instrument(ArrayFrames(raw, few.names), instrument, few)
+
+
+def test_the_uncertainty_of_the_light_is_in_the_accuracy():
+    """Case M1: the generator's zero is off by 1.5°, which no input held out can show: the reduction is wrong by
+    2·1.5°/√2 = 3.7 % of Q and U, and the accuracy says so once the table does; without, there is a word."""
+    nominal = rotating_polarizer(np.deg2rad([0, 45, 90, 135]))
+    linear = standard_inputs(6, circular=False)
+    names = tuple("abcdef")
+    off = np.deg2rad(1.5)
+    frames = frames_of(nominal.turned(-off), InputTable(names, linear))
+    instrument = Instrument(nominal, DETECTOR)
+    silent = calibrate_instrument(frames, instrument, InputTable(names, linear))
+    assert silent.instrument.polarimeter.accuracy[0] < 0.005
+    assert "nominal one turned by -1.5°" in silent.warnings[0]
+    psi = np.pi * np.arange(6) / 6
+    std = 2 * off * np.abs([np.sin(2 * psi), np.cos(2 * psi), 0 * psi])
+    stated = calibrate_instrument(frames, instrument, InputTable(names, linear, std))
+    accuracy = stated.instrument.polarimeter.accuracy
+    assert accuracy[0] == pytest.approx(2 * off / np.sqrt(2), rel=0.02)
+    assert accuracy[1] == 0.0
+    assert stated.warnings == []
+    # the error that there really is
+    found = reduced_inputs(stated.instrument.polarimeter.analyzer, nominal.intensities(linear))
+    rms = np.sqrt(np.mean((found[1:3] / found[0] - linear[1:3]) ** 2))
+    assert rms == pytest.approx(accuracy[0], rel=0.05)
+
+
+def test_one_colour_of_a_colour_camera(tmp_path):
+    """Polarisers that are weaker behind red: the calibration of that colour finds their vectors, is written with its
+    colour, and reads pictures with it; all colours at once are refused."""
+    rng = np.random.default_rng(0)
+    layout = np.deg2rad([[90.0, 45.0], [135.0, 0.0]])
+    weak, good = (division_of_focal_plane(layout, diattenuation=d) for d in (0.8, 0.97))
+    light = 3000.0 * standard_inputs(6, circular=False)
+    colors = {"R": weak, "G": good, "B": good}
+    pictures = []
+    for s in light.T:
+        cells = [[colors[c].intensities(s)[weak.mosaic] for c in row] for row in BAYER]
+        pictures.append(DETECTOR.expose(np.tile(np.block(cells), (8, 8)), rng))
+    pictures = ArrayFrames(np.stack(pictures)[:, None], tuple("abcdef"))
+    inputs = InputTable(tuple("abcdef"), light / 3000.0)
+    nominal = division_of_focal_plane(layout)
+    with pytest.raises(DataError, match='set color = "R"'):
+        both = replace(nominal, filters=ColorFilters())
+        calibrate_instrument(ColorFrames(pictures, both), Instrument(both, DETECTOR), inputs)
+    red = replace(nominal, filters=ColorFilters(only="R"))
+    made = calibrate_instrument(ColorFrames(pictures, red), Instrument(red, DETECTOR), inputs)
+    np.testing.assert_allclose(made.instrument.polarimeter.analyzer, weak.analyzer, atol=2e-3)
+    save_instrument(made.instrument, tmp_path / "red.toml")
+    again = load_instrument(tmp_path / "red.toml")
+    assert again.polarimeter.filters == ColorFilters(only="R")
+    np.testing.assert_array_equal(again.polarimeter.mosaic, nominal.mosaic)

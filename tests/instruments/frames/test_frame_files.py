@@ -327,9 +327,8 @@ def test_a_file_cut_short(tmp_path):
         png(tmp_path / f"{state}.png", noise)
     whole = (tmp_path / "45.png").read_bytes()
     (tmp_path / "45.png").write_bytes(whole[: len(whole) // 2])
-    frames = open_frames(tmp_path, polarizer())
     with pytest.raises(DataError, match=r"45\.png: cannot be read as a picture"):
-        frames.read(0, 0, 64)
+        open_frames(tmp_path, polarizer()).read(0, 0, 64)
 
 
 def test_damaged_headers(tmp_path, capfd):
@@ -358,7 +357,9 @@ def test_text_called_a_picture(tmp_path):
 
 def test_numbers_that_are_not_raw(tmp_path, numbers):
     np.save(tmp_path / "run.npy", numbers / 3.0)
-    assert "numbers of the type float64: give raw frames, uint8 or uint16" in refuse(tmp_path / "run.npy")
+    assert "numbers are of the type float64, as means of several exposures are: say of how many" in refuse(
+        tmp_path / "run.npy"
+    )
 
 
 def test_one_picture_for_many_states(tmp_path, numbers):
@@ -399,6 +400,6 @@ def test_an_empty_folder_and_no_folder(tmp_path):
 
 def test_a_frames_table_with_an_unknown_key(tmp_path, numbers):
     folder = folder_of("png")(tmp_path, numbers)
-    assert "[frames] dark: there is no such key; use pattern, dark_frame" in refuse(
+    assert "[frames] dark: there is no such key; use pattern, exposures" in refuse(
         folder, polarizer({"dark": "d"})
     )

@@ -36,4 +36,6 @@ def test_the_mosaic_camera():
 def test_unknown_names():
     with pytest.raises(DataError, match="paper, conservative, sony_imx250mzr"):
         preset("papr")
-    assert set(PRESETS) == {"paper", "conservative", "sony_imx250mzr"}
+    assert set(PRESETS) == {
+        "paper", "conservative", "sony_imx250mzr", "sony_imx250myr", "sony_imx264myr"
+    }  # fmt: skip

@@ -186,9 +186,13 @@ def test_pictures_that_do_not_fit_are_named(in_folder):
 
 
 def test_numbers_beyond_the_converter_are_an_error():
-    """12 bits in the upper end of 16 read as numbers that a 12-bit converter cannot give."""
+    """12 bits in the upper end of 16 read as numbers that a 12-bit converter cannot give; others need more bits."""
     raw = np.full((4, ROWS, COLUMNS), 700 << 4, np.uint16)
-    with pytest.raises(DataError, match="a pixel reads 11200, but 12 bits end at 4095: set bits"):
+    with pytest.raises(
+        DataError, match=r'a pixel reads 11200, but 12 bits end at 4095: .* alignment = "left"'
+    ):
         reduced(raw, Instrument(POLARIZER, Detector(bits=12)), Corrections())
+    with pytest.raises(DataError, match="a pixel reads 11201, but 12 bits end at 4095: set bits = 14"):
+        reduced(raw + np.uint16(1), Instrument(POLARIZER, Detector(bits=12)), Corrections())
     with pytest.raises(DataError, match=r"its numbers have 8 bits, but \[detector\] says bits = 12"):
         reduced(raw.astype(np.uint8), Instrument(POLARIZER, Detector(bits=12)), Corrections())

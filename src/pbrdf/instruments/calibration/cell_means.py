@@ -9,10 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pbrdf.errors import DataError
-from pbrdf.instruments.frames.frames import Frames
+from pbrdf.instruments.frames.digital_numbers import require_range
+from pbrdf.instruments.frames.exposures import Reading, combine, single
+from pbrdf.instruments.frames.frames import Frames, color_cells_of
 from pbrdf.instruments.polarimeter.detector import Detector
 from pbrdf.instruments.polarimeter.instrument import Instrument
-from pbrdf.instruments.reduction.corrections import Corrections, require_range
+from pbrdf.instruments.reduction.corrections import Corrections
 from pbrdf.instruments.reduction.regions import Region, require_inside
 from pbrdf.instruments.reduction.stokes_image import PixelFlag, count_flags, flag_pixels
 
@@ -85,7 +87,7 @@ def cell_means(
             f"calibration frames have the shape {frames.shape}: give (states, inputs, rows, columns)"
         )
     return _one_by_one(
-        lambda k: frames[:, k],
+        lambda k: single(frames[:, k], detector),
         np.ones(frames.shape[1], dtype=bool),
         detector,
         cells=cells,
@@ -128,6 +130,7 @@ def cell_means_of_frames(
     DataError
         If frames, instrument and regions do not fit each other, or no pixel is good.
     """
+    instrument.require_stokes()
     size = instrument.polarimeter.size
     if frames.states != size:
         raise DataError(
@@ -137,15 +140,17 @@ def cell_means_of_frames(
     used = None
     if regions:
         used = np.any([region.mask(0, frames.rows, frames.columns) for region in regions], axis=0)
-    pixels = Corrections.of(instrument, frames).pixels(instrument, slice(0, frames.rows))
+    color = color_cells_of(frames, 0)
+    corrections = Corrections.of(instrument, frames)
+    pixels = corrections.pixels(instrument, slice(0, frames.rows * color.size[0])).part(color)
 
-    def read(k: int) -> np.ndarray:
-        raw = frames.read(k, 0, frames.rows)
+    def read(k: int) -> Reading:
+        raw = color.parts(frames.read(k, 0, frames.rows))[0]
         try:
-            require_range(raw, instrument)
+            require_range(raw, instrument.detector)
         except DataError as error:
             raise DataError(f"series {frames.names[k]!r}: {error}") from None
-        return raw
+        return combine(raw, instrument.detector, corrections.layout.exposures or 1)
 
     return _one_by_one(
         read,
@@ -162,7 +167,7 @@ def cell_means_of_frames(
 
 
 def _one_by_one(
-    read: Callable[[int], np.ndarray],
+    read: Callable[[int], Reading],
     lit: np.ndarray,
     detector: Detector,
     *,
@@ -174,26 +179,32 @@ def _one_by_one(
     used: np.ndarray | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> CellMeans:
-    """The means from frames that `read` gives by the number of the input, shape (N, rows, columns); each is read twice.
+    """The means from what `read` gives by the number of the input, shape (N, rows, columns); each is read twice.
 
     At inputs that are not lit no pixel counts as dark; pixels that are not `used` are left out.
     """
     inputs = len(lit)
     first = read(0)
-    states, rows, columns = first.shape
+    shape = states, rows, columns = first.numbers.shape
     tall, wide = (rows, columns) if cells is None else cells
     if not (1 <= tall <= rows and 1 <= wide <= columns):
         raise DataError(f"pictures of {rows} × {columns} pixels cannot be divided into {tall} × {wide} cells")
     level = np.asarray(detector.black if black is None else black, dtype=float)
     response = np.asarray(1.0 if flat is None else flat, dtype=float)
     for name, array in (("the black level", level), ("the flat field", response)):
-        if array.shape not in ((), (rows, columns), first.shape):
+        if array.shape not in ((), (rows, columns), shape):
             raise DataError(f"{name} has the shape {array.shape}, the frames are {rows} × {columns} pixels")
     wanted = np.ones((rows, columns), dtype=bool) if used is None else used
     flags = np.where(wanted, np.uint8(0), np.uint8(PixelFlag.DEAD))
     for k in range(inputs):
+        reading = first if k == 0 else read(k)
         found = flag_pixels(
-            first if k == 0 else read(k), detector, dead=dead, dark_level=dark_level, black=black
+            reading.numbers,
+            detector,
+            dead=dead,
+            dark_level=dark_level,
+            black=black,
+            saturated=reading.saturated,
         )
         flags |= found if lit[k] else found & ~np.uint8(PixelFlag.DARK)
         if progress is not None:
@@ -201,10 +212,10 @@ def _one_by_one(
     good = flags == 0
     if not good.any():
         raise DataError("no pixel of the calibration frames is good: all are saturated, dead or dark")
-    response = np.broadcast_to(response, first.shape)
+    response = np.broadcast_to(response, shape)
     if not (response[:, good] > 0.0).all():
         raise DataError("the flat field is not positive at a pixel that is used: mark it as dead")
-    level = np.broadcast_to(level, first.shape)
+    level = np.broadcast_to(level, shape)
     starts = [-(-np.arange(count) * size // count) for count, size in ((tall, rows), (wide, columns))]
 
     def total(image: np.ndarray) -> np.ndarray:
@@ -216,12 +227,13 @@ def _one_by_one(
     intensities = np.empty((states, inputs, tall, wide))
     variance = np.empty_like(intensities)
     for k in range(inputs):
-        raw = read(k)
+        reading = read(k)
+        spread = reading.variance(detector)
         for j in range(states):
-            frame = np.where(good, raw[j], level[j])
+            frame = np.where(good, reading.numbers[j], level[j])
             divisor = np.where(good, response[j], 1.0)
             intensities[j, k] = total((frame - level[j]) / divisor * good) * share
-            variance[j, k] = total(detector.variance(frame) / divisor**2 * good) * share**2
+            variance[j, k] = total(np.where(good, spread[j], 0.0) / divisor**2) * share**2
         if progress is not None:
             progress(inputs + k + 1, 2 * inputs)
     if cells == (1, 1):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
@@ -31,6 +32,8 @@ __all__ = ["InstrumentCalibration", "calibrate_instrument"]
 _CONTRADICTION = 0.1
 #: Analyser vectors further than this share of w_I from the nominal ones are probably those of another instrument.
 _OTHER_INSTRUMENT = 0.3
+#: An instrument turned by less, radians, is no reason for a word.
+_WORTH_A_WORD = np.deg2rad(0.3)
 #: Bytes that a map may take while it is calibrated.
 _MOST_MEMORY = 4e9
 
@@ -42,7 +45,9 @@ class InstrumentCalibration:
     Attributes
     ----------
     instrument
-        To reduce with. Its analyser vectors have the mean transmittance of the nominal ones (fitted settings: of the
+        To reduce with. Its accuracy is that at the inputs held out with the uncertainty of the light itself
+        (:attr:`.InputTable.accuracy`) added in squares.
+        Its analyser vectors have the mean transmittance of the nominal ones (fitted settings: of the
         settings), so that Stokes parameters stay in digital numbers.
     nominal
         What it was taken for, with as many cells as the calibration.
@@ -90,6 +95,13 @@ class InstrumentCalibration:
             )
         elif self.instrument.polarimeter.determined[3] and not (abs(S[3]) > 0.5 * S[0]).any():
             said.append("no circular input was held out: the circular accuracy is that at light without V")
+        turn = self.common_turn
+        if not self.inputs.ratio_std.any() and abs(turn) > _WORTH_A_WORD:
+            said.append(
+                f"the instrument found is the nominal one turned by {math.degrees(turn):.2g}°: its own axes, or the "
+                "zero of the polariser before it? An error that all inputs share is not in the accuracy (1° makes "
+                "2.5 % of Q and U): state how well the light is known in a column angle_std_deg"
+            )
         return said
 
     @property
@@ -126,6 +138,19 @@ class InstrumentCalibration:
         nominal = self.nominal.analyzer
         apart = (self.instrument.polarimeter.analyzer - nominal) / nominal[..., 0].mean()
         return np.array([np.sqrt(np.mean(apart[..., part] ** 2)) for part in ([0], [1, 2], [3])])
+
+    @property
+    def common_turn(self) -> float:
+        """Radians by which the instrument found is the nominal one turned about its axis; 0 if it is not just turned.
+
+        Inputs whose zero is off by an angle make such an instrument, and so does one that is mounted so.
+        """
+        nominal, found = (p.mean_analyzer[:, 1:3] for p in (self.nominal, self.instrument.polarimeter))
+        before, after = (w[:, 0] + 1j * w[:, 1] for w in (nominal, found))
+        overlap = np.vdot(before, after)
+        turned = before * np.exp(1j * np.angle(overlap))
+        rest, apart = np.linalg.norm(after - turned), np.linalg.norm(after - before)
+        return float(0.5 * np.angle(overlap)) if rest < 0.25 * apart else 0.0
 
 
 def calibrate_instrument(
@@ -173,6 +198,12 @@ def calibrate_instrument(
     FitError
         If the fit of the settings does not converge.
     """
+    filters = instrument.polarimeter.filters
+    if filters is not None and (filters.only is None or len(filters.places[filters.only]) > 1):
+        raise DataError(
+            f"{instrument.polarimeter.name}: each colour is calibrated for itself, since each sees light through other "
+            'polarisers: set color = "R" in [polarimeter], then the others (greens = "apart" gives G1 and G2)'
+        )
     table = inputs.rows(frames.names)
     out: Sequence[int] | Literal["each"] = "each"
     if not isinstance(held_out, str):
@@ -227,14 +258,18 @@ def calibrate_instrument(
             mosaic=polarimeter.mosaic,
         )
     made = found.polarimeter
-    if found.accuracy is None:
-        made = made.with_accuracy(*polarimeter.accuracy)
+    made = replace(made, filters=filters)
+    shown = polarimeter.accuracy if found.accuracy is None else made.accuracy
+    known = table.accuracy
+    made = made.with_accuracy(
+        math.hypot(shown[0], known[0]), math.hypot(shown[1], known[1] * made.determined[3])
+    )
     seen = np.stack([reduced_inputs(nominal.analyzer, read[:, k]) for k in range(S.shape[1])], axis=1)
     return InstrumentCalibration(
         instrument=replace(instrument, polarimeter=made, detector=detector),
         nominal=nominal,
         calibration=found,
-        inputs=InputTable(table.names, S),
+        inputs=InputTable(table.names, S, table.ratio_std),
         readings=readings,
         nominal_found=seen,
         nominal_accuracy=accuracy_of(seen, S, found.held_out),

@@ -1,4 +1,4 @@
-"""Frames in netCDF files and Zarr folders: a variable over series, state, y and x."""
+"""Frames in netCDF files and Zarr folders: a variable over series, state, y and x, and repeat where there is one."""
 
 from __future__ import annotations
 
@@ -26,6 +26,7 @@ _DIMENSIONS = {
     "state": ("state", "states", "analyzer"),
     "y": ("y", "row", "rows"),
     "x": ("x", "column", "columns"),
+    "repeat": ("repeat", "repeats", "repetition"),
 }
 
 
@@ -38,7 +39,7 @@ class GriddedFrames:
     names
         Of the series.
     variable
-        With the dimensions y and x, and series and state where there is more than one.
+        With the dimensions y and x, and series, state and repeat where there is more than one.
     path
         The file or folder, for messages.
     """
@@ -63,12 +64,17 @@ class GriddedFrames:
         part = self.variable.isel(y=slice(first_row, last_row))
         if "series" in part.dims:
             part = part.isel(series=series)
-        order = ("state", "y", "x") if "state" in part.dims else ("y", "x")
+        order = tuple(dim for dim in ("repeat", "state", "y", "x") if dim in part.dims)
         try:
             values = part.transpose(*order).values
         except (OSError, RuntimeError, ValueError) as error:
             raise DataError(f"{self.path}: cannot be read: {error}") from error
-        return values if values.ndim == 3 else values[np.newaxis]
+        return values if "state" in part.dims else values[..., np.newaxis, :, :]
+
+    @property
+    def layers(self) -> int:
+        """Repeats of each state."""
+        return self.variable.sizes.get("repeat", 1)
 
 
 def open_grid(path: Path, states: Sequence[str]) -> GriddedFrames:
@@ -97,7 +103,7 @@ def open_grid(path: Path, states: Sequence[str]) -> GriddedFrames:
     except (OSError, ValueError, KeyError) as error:
         raise DataError(f"{path}: cannot be read: {error}") from error
     frames = _variable(path, file)
-    require_raw(frames.dtype, f"{path}: the variable {frames.name}")
+    require_raw(frames.dtype, f"{path}: the variable {frames.name}", means=True)
     names = _labels(frames, "series") if "series" in frames.dims else (path.stem,)
     if len(set(names)) != len(names):
         raise DataError(f"{path}: two series of {frames.name} have the same name")

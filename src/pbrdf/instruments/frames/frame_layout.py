@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import difflib
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from pbrdf.errors import DataError
+from pbrdf.instruments.frames.raw_files import RawFormat
 
 __all__ = ["FrameLayout"]
 
@@ -18,8 +21,19 @@ class FrameLayout:
     Attributes
     ----------
     pattern
-        How the files of a folder are called, with ``{series}`` and ``{state}`` for the names; with a slash for folders
-        in the folder, ``{series}/{state}``; None: what :func:`pbrdf.instruments.frames.frame_files.open_frames` finds.
+        How the files of a folder are called, with ``{series}``, ``{state}`` and ``{repeat}`` for the names; with a
+        slash for folders in the folder, ``{series}/{state}``; None: what
+        :func:`pbrdf.instruments.frames.frame_files.open_frames` finds.
+    exposures
+        How many exposures each picture is the mean of; None where it is not stated: 1 for whole numbers.
+    repeats
+        How many pictures of each state were taken one after another and are in the same file; None: as many as there
+        are.
+    pages
+        Which pictures of a file follow each other, the one that changes slowest first: some of series, state, repeat.
+        None: series, state.
+    raw
+        Size and format of files that are nothing but pixels.
     dark_frame
         Picture taken with the light shut out, the same for all states.
     flat_field
@@ -34,6 +48,10 @@ class FrameLayout:
     """
 
     pattern: str | None = None
+    exposures: int | None = None
+    repeats: int | None = None
+    pages: tuple[str, ...] | None = None
+    raw: RawFormat | None = None
     dark_frame: Path | None = None
     flat_field: Path | None = None
     dead_pixels: Path | None = None
@@ -54,11 +72,19 @@ class FrameLayout:
         values: dict[str, Any] = {}
         for key, value in table.items():
             if key not in known:
-                raise DataError(f"[frames] {key}: there is no such key; use {', '.join(known)}")
-            if key.endswith("_exposures"):
+                near = difflib.get_close_matches(key, known, n=1)
+                raise DataError(
+                    f"[frames] {key}: there is no such key{f' (perhaps {near[0]!r})' if near else ''}; use "
+                    f"{', '.join(known)}"
+                )
+            if key.endswith("exposures") or key == "repeats":
                 if not (isinstance(value, int) and not isinstance(value, bool) and value >= 1):
                     raise DataError(f"[frames] {key} is {value!r}: give a whole number from 1")
                 values[key] = value
+            elif key == "pages":
+                values[key] = _order(value)
+            elif key == "raw":
+                values[key] = RawFormat.from_table(value)
             elif key == "flat_transmittance":
                 numbers = isinstance(value, list) and all(type(v) in (int, float) and v > 0.0 for v in value)
                 if not numbers:
@@ -74,3 +100,15 @@ class FrameLayout:
     def files(self) -> tuple[Path, ...]:
         """Files that are not frames themselves."""
         return tuple(f for f in (self.dark_frame, self.flat_field, self.dead_pixels) if f is not None)
+
+
+def _order(value: Any) -> tuple[str, ...]:
+    """The words of ``pages``, such as "series, repeat, state"."""
+    words = tuple(re.findall(r"[a-z]+", value.lower())) if isinstance(value, str) else ()
+    words = tuple("series" if word.startswith("serie") else word.removesuffix("s") for word in words)
+    if not words or set(words) - {"series", "state", "repeat"} or len(set(words)) < len(words):
+        raise DataError(
+            f"[frames] pages is {value!r}: name what follows each other in a file, the slowest first, each once: "
+            '"series, state", "state, series", "series, repeat, state" …'
+        )
+    return words

@@ -2,6 +2,10 @@
 
 Whatever the files are, the reduction sees them as :class:`Frames`, which it reads by blocks of rows: a measurement
 larger than memory is never held as a whole. Row 0 is the top row of the picture, column 0 the left one.
+
+Some frames have more to say than the others, and those that have not need no attribute for it: how many pictures there
+are for each state (:func:`layers_of`), by how much the files' numbers were shifted (:func:`shift_of`), which pixels of
+a colour mosaic a series is made of (:func:`color_cells_of`), and what should be told about them (:func:`notes_of`).
 """
 
 from __future__ import annotations
@@ -14,7 +18,19 @@ import numpy as np
 
 from pbrdf.errors import DataError
 
-__all__ = ["ArrayFrames", "ChosenSeries", "Frames", "named", "require_raw"]
+__all__ = [
+    "ArrayFrames",
+    "ChosenSeries",
+    "ColorCells",
+    "Frames",
+    "color_cells_of",
+    "color_sources_of",
+    "layers_of",
+    "named",
+    "notes_of",
+    "require_raw",
+    "shift_of",
+]
 
 
 class Frames(Protocol):
@@ -43,8 +59,32 @@ class Frames(Protocol):
     def columns(self) -> int: ...
 
     def read(self, series: int, first_row: int, last_row: int) -> np.ndarray:
-        """Raw digital numbers of some rows of a series, uint8 or uint16, shape (N, last_row − first_row, columns)."""
+        """Raw digital numbers of some rows of a series, shape (N, last_row − first_row, columns).
+
+        Whole numbers, or means of exposures with decimals; shape (K, N, …) where each state was taken K times. Of a
+        colour mosaic the rows and columns are those of :attr:`ColorCells.size` for each of ours.
+        """
         ...
+
+
+@dataclass(frozen=True)
+class ColorCells:
+    """Which polarisation cells of a colour mosaic have a colour.
+
+    Attributes
+    ----------
+    size
+        Rows and columns of cells over which the colours repeat.
+    places
+        Row and column of each cell of the colour; more than one are averaged.
+    """
+
+    size: tuple[int, int] = (1, 1)
+    places: tuple[tuple[int, int], ...] = ((0, 0),)
+
+    def parts(self, array: np.ndarray) -> list[np.ndarray]:
+        """What belongs to each of the places of an array (..., rows, columns)."""
+        return [array[..., y :: self.size[0], x :: self.size[1]] for y, x in self.places]
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +94,9 @@ class ArrayFrames:
     Attributes
     ----------
     array
-        Raw digital numbers, uint8 or uint16, shape (M, N, rows, columns).
+        Raw digital numbers of the converter, whole or means of exposures with decimals, shape (M, N, rows, columns).
+        Numbers in the upper end of 16 bits are made such by
+        :class:`~pbrdf.instruments.frames.digital_numbers.ConvertedFrames` around these frames.
     names
         Of the M series; "1", "2", … by default.
 
@@ -68,7 +110,7 @@ class ArrayFrames:
     names: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        require_raw(self.array.dtype, "the array of frames")
+        require_raw(self.array.dtype, "the array of frames", means=True)
         if self.array.ndim != 4 or 0 in self.array.shape:
             raise DataError(
                 f"the array of frames has the shape {self.array.shape}: give (series, states, rows, columns)"
@@ -120,15 +162,70 @@ class ChosenSeries:
         self._index = [frames.names.index(name) for name in names]
         self.names = tuple(names)
         self.states, self.rows, self.columns = frames.states, frames.rows, frames.columns
+        self.layers, self.shift = layers_of(frames), shift_of(frames)
+        self.sources = tuple(color_sources_of(frames)[k] for k in self._index if color_sources_of(frames))
 
     def read(self, series: int, first_row: int, last_row: int) -> np.ndarray:
         return self._frames.read(self._index[series], first_row, last_row)
 
+    def color_cells(self, series: int) -> ColorCells:
+        """As of the other frames."""
+        return color_cells_of(self._frames, self._index[series])
 
-def require_raw(dtype: np.dtype[Any], what: str) -> None:
-    """Check that numbers are those of a camera's converter, uint8 or uint16; raises DataError, which names `what`."""
-    if dtype.kind != "u" or dtype.itemsize > 2:
-        raise DataError(f"{what} holds numbers of the type {dtype}: give raw frames, uint8 or uint16")
+    @property
+    def notes(self) -> list[str]:
+        """As of the other frames."""
+        return notes_of(self._frames)
+
+
+def layers_of(frames: Frames) -> int:
+    """Numbers that :meth:`Frames.read` gives for each state and pixel, at most."""
+    return int(getattr(frames, "layers", 1))
+
+
+def shift_of(frames: Frames) -> int:
+    """By how many bits the numbers of the files were shifted down."""
+    return int(getattr(frames, "shift", 0))
+
+
+def color_cells_of(frames: Frames, series: int) -> ColorCells:
+    """Which cells of a colour mosaic the series is made of; all of any other camera."""
+    own = getattr(frames, "color_cells", None)
+    return ColorCells() if own is None else own(series)
+
+
+def color_sources_of(frames: Frames) -> tuple[tuple[str, str, float | None], ...]:
+    """For each series the picture, the colour and its wavelength (nm); empty where there are no colours."""
+    return tuple(getattr(frames, "sources", ()))
+
+
+def notes_of(frames: Frames) -> list[str]:
+    """What a user should know of the frames read so far, one sentence each."""
+    return list(getattr(frames, "notes", ()))
+
+
+def require_raw(dtype: np.dtype[Any], what: str, *, means: bool = False) -> None:
+    """Check that numbers can be those of a camera's converter.
+
+    Parameters
+    ----------
+    dtype
+        Their type: whole numbers.
+    what
+        Holds them, for the message.
+    means
+        Take floating point too, for means of exposures.
+
+    Raises
+    ------
+    DataError
+        If they cannot.
+    """
+    if dtype.kind not in ("uif" if means else "ui"):
+        also = ", or means of exposures with decimals" if means else ""
+        raise DataError(
+            f"{what} holds numbers of the type {dtype}: give raw frames, whole numbers of 8 or 16 bits{also}"
+        )
 
 
 def named(names: Sequence[str], most: int = 5) -> str:

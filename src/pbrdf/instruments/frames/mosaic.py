@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pbrdf.errors import DataError
-from pbrdf.instruments.frames.frames import Frames
+from pbrdf.instruments.frames.frames import Frames, layers_of, notes_of, shift_of
 from pbrdf.instruments.polarimeter.polarimeter import Polarimeter
 
 __all__ = ["MosaicFrames", "split_mosaic", "weave_mosaic"]
@@ -69,11 +69,25 @@ class MosaicFrames:
     def columns(self) -> int:
         return self.pictures.columns // self._cell[1]
 
+    @property
+    def layers(self) -> int:
+        """As of the pictures."""
+        return layers_of(self.pictures)
+
+    @property
+    def shift(self) -> int:
+        """As of the pictures."""
+        return shift_of(self.pictures)
+
+    @property
+    def notes(self) -> list[str]:
+        """As of the pictures."""
+        return notes_of(self.pictures)
+
     def read(self, series: int, first_row: int, last_row: int) -> np.ndarray:
         tall = self._cell[0]
-        return split_mosaic(
-            self.pictures.read(series, first_row * tall, last_row * tall)[0], self.polarimeter
-        )
+        pictures = self.pictures.read(series, first_row * tall, last_row * tall)
+        return split_mosaic(pictures[..., 0, :, :], self.polarimeter)
 
 
 def split_mosaic(picture: ArrayLike, polarimeter: Polarimeter) -> np.ndarray:

@@ -19,7 +19,7 @@ sample stood (the paper's Angle_S_I), kept for the record.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -32,9 +32,9 @@ from pbrdf.data.conventions import azimuth_forward_pi_to_zero
 from pbrdf.data.degrees import exact_degrees
 from pbrdf.errors import DataError
 from pbrdf.files.delimited import Table, read_table, write_table
-from pbrdf.instruments.frames.frames import named
+from pbrdf.instruments.frames.frames import Frames, color_sources_of, named
 
-__all__ = ["AngleTable", "read_angles", "write_angles"]
+__all__ = ["AngleTable", "angles_of", "read_angles", "write_angles"]
 
 _ANGLES = ("theta_i", "theta_r", "phi", "reference_angle", "sample_angle")
 _COLUMNS = ("series", *_ANGLES[:3], "group", "wavelength", "exposure", *_ANGLES[3:])
@@ -131,13 +131,43 @@ class AngleTable:
         missing = [name for name in names if name not in self.names]
         if missing:
             raise DataError(f"the angle table has no row for {named(missing)}; it has {named(self.names)}")
+        return replace(self._taken(names), names=tuple(names))
+
+    def for_frames(self, frames: Frames) -> AngleTable:
+        """The table with a row for each colour of each picture, where the camera sees several: :meth:`for_colors`."""
+        return self.for_colors(color_sources_of(frames))
+
+    def for_colors(self, sources: Sequence[tuple[str, str, float | None]]) -> AngleTable:
+        """The table with a row for each of these: name of a picture, colour, wavelength (nm) if it is known.
+
+        Rows of pictures serve all their colours: with the nominal wavelength of the colour if the table has none, and
+        where that is not known either, with the colour as group. A table that names the colours' series stays as it is.
+        """
+        if not sources or not {picture for picture, _, _ in sources} & set(self.names):
+            return self
+        chosen = [(picture, color, nm) for picture, color, nm in sources if picture in self.names]
+        table = self._taken([picture for picture, _, _ in chosen])
+        known = all(nm is not None for _, _, nm in chosen)
+        group, wavelength = np.asarray(table.group), table.wavelength
+        if wavelength is None and known:
+            wavelength = np.array([nm for _, _, nm in chosen], dtype=float)
+        elif wavelength is None:
+            plain = len(set(group.tolist())) == 1
+            group = np.array(
+                [color if plain else f"{g} {color}" for g, (_, color, _) in zip(group, chosen, strict=True)]
+            )
+        names = tuple(f"{picture}_{color}" for picture, color, _ in chosen)
+        return replace(table, names=names, group=group, wavelength=wavelength)
+
+    def _taken(self, names: Sequence[str]) -> AngleTable:
+        """Rows of these series, as often as they are named, under the numbers 1, 2, …"""
         index = np.array([self.names.index(name) for name in names], dtype=int)
         chosen: dict[str, Any] = {
-            field: getattr(self, field)[index]
+            field: np.asarray(getattr(self, field))[index]
             for field in (*_ANGLES, "exposure", "wavelength", "group")
             if getattr(self, field) is not None
         }
-        return replace(self, names=tuple(names), **chosen)
+        return replace(self, names=tuple(str(k) for k in range(len(names))), **chosen)
 
 
 def read_angles(path: str | Path) -> AngleTable:
@@ -148,11 +178,30 @@ def read_angles(path: str | Path) -> AngleTable:
     DataError
         Names the file, and the line and the column where there is one.
     """
-    path = Path(path)
-    table = read_table(path)
+    return angles_of(read_table(Path(path)))
+
+
+def angles_of(table: Table, others: Collection[str] = (), names: Sequence[str] | None = None) -> AngleTable:
+    """The angles in a table of text.
+
+    Parameters
+    ----------
+    table
+        As :func:`read_angles` reads it.
+    others
+        Columns that hold something else.
+    names
+        Of the series, where no column says so.
+
+    Raises
+    ------
+    DataError
+        As :func:`read_angles`.
+    """
+    path = table.path
     forward_at_zero = _stated(table, "azimuth", ("forward=0", "forward=180")) == "forward=0"
     usual = "rad" if _stated(table, "angles", ("degrees", "radians")) == "radians" else "deg"
-    columns = _columns(path, table.names, usual)
+    columns = _columns(path, table.names, usual, others, names is None)
     table.require_rows()
     values: dict[str, Any] = {}
     for name, (index, unit) in columns.items():
@@ -165,8 +214,9 @@ def read_angles(path: str | Path) -> AngleTable:
             if name in _ANGLES and unit != "rad":
                 values[name] = np.deg2rad(values[name])
     _sides(path, values)
+    own = values.pop("series", names)
     try:
-        return AngleTable(names=values.pop("series"), **values)
+        return AngleTable(names=tuple(own if names is None else names), **values)
     except DataError as error:
         raise DataError(f"{path}: {error}") from None
 
@@ -183,10 +233,14 @@ def _stated(table: Table, key: str, choices: tuple[str, str]) -> str:
     return choices[0]
 
 
-def _columns(path: Path, names: list[str], usual: str) -> dict[str, tuple[int, str | None]]:
+def _columns(
+    path: Path, names: list[str], usual: str, others: Collection[str], named_series: bool
+) -> dict[str, tuple[int, str | None]]:
     """Place and unit of each column that is known; angles without one are in the usual unit."""
     found: dict[str, tuple[int, str | None]] = {}
     for index, name in enumerate(names):
+        if name in others:
+            continue
         words = [word for word in re.split(r"[\s_.\-\[\]()]+", name.lower()) if word]
         unit = _UNITS.get(words[-1]) if len(words) > 1 else None
         key = "_".join(words[:-1] if unit else words)
@@ -200,7 +254,7 @@ def _columns(path: Path, names: list[str], usual: str) -> dict[str, tuple[int, s
             raise DataError(f"{path}: the unit of the column {name!r} is not understood")
         found[key] = (index, unit or (usual if key in _ANGLES else None))
     for key in _NEEDED:
-        if key not in found:
+        if key not in found and (key != "series" or named_series):
             raise DataError(f"{path}: there is no column {key}; the columns are {', '.join(names)}")
     return found
 

@@ -42,6 +42,13 @@ class Detector:
         Dark signal of one exposure, electrons.
     full_well
         Electrons a pixel holds; None if the converter clips first.
+    full_scale
+        Digital number at which the converter ends, if that is below 2^bits − 1 (4080 of 8 bits stretched to 12); else
+        None.
+    alignment
+        Where the bits stand in the numbers of 16 bits that files hold: ``"right"``, the numbers are those of the
+        converter; ``"left"``, they are shifted up to end at 65535, as the format Mono16 of many cameras has it, and
+        are shifted down when they are read; None: the frames tell.
 
     Raises
     ------
@@ -55,20 +62,28 @@ class Detector:
     offset: float = 0.0
     dark: float = 0.0
     full_well: float | None = None
+    full_scale: float | None = None
+    alignment: str | None = None
 
     def __post_init__(self) -> None:
         whole = isinstance(self.bits, Integral) and not isinstance(self.bits, bool)
         if not (whole and 1 <= self.bits <= 16):
             raise DataError(f"detector: bits is {self.bits!r}, it must be a whole number from 1 to 16")
-        for name in ("gain", "read_noise", "offset", "dark", "full_well"):
+        if self.alignment not in (None, "left", "right"):
+            raise DataError(f"detector: alignment is {self.alignment!r}, it must be 'left' or 'right'")
+        for name in ("gain", "read_noise", "offset", "dark", "full_well", "full_scale"):
             value = getattr(self, name)
-            if name == "full_well" and value is None:
+            if name in ("full_well", "full_scale") and value is None:
                 continue
             number = isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)
-            positive = name in ("gain", "full_well")
+            positive = name in ("gain", "full_well", "full_scale")
             if not (number and (value > 0.0 if positive else value >= 0.0)):
                 limit = "more than 0" if positive else "0 or more"
                 raise DataError(f"detector: {name} is {value!r}, it must be a number of {limit}")
+        if self.full_scale is not None and self.full_scale > 2**self.bits - 1:
+            raise DataError(
+                f"detector: full_scale is {self.full_scale:g}, but {self.bits} bits end at {2**self.bits - 1}"
+            )
         if self.range <= 0.0:
             raise DataError(
                 f"detector: offset {self.offset:g} and dark signal {self.dark / self.gain:g} leave no range below "
@@ -87,7 +102,7 @@ class Detector:
         The largest of the converter, or less if the pixel fills before: then read noise scatters the full pixels, and
         those up to 4 read noises below the full well count.
         """
-        top = float(2**self.bits - 1)
+        top = float(2**self.bits - 1 if self.full_scale is None else self.full_scale)
         if self.full_well is None:
             return top
         least = (self.full_well - _SATURATION_MARGIN * self.read_noise) / self.gain + self.offset
@@ -129,7 +144,8 @@ class Detector:
         held += self.read_noise * rng.standard_normal(held.shape)
         numbers = np.rint(held / self.gain + self.offset)
         kind = np.uint8 if self.bits <= 8 else np.uint16
-        return np.clip(numbers, 0.0, 2.0**self.bits - 1.0).astype(kind)
+        top = 2.0**self.bits - 1.0 if self.full_scale is None else self.full_scale
+        return np.clip(numbers, 0.0, top).astype(kind)
 
     def signal(self, frames: ArrayLike) -> np.ndarray:
         """Signal above black level, digital numbers."""

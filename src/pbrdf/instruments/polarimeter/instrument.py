@@ -9,6 +9,7 @@ from typing import Any
 
 from pbrdf.errors import DataError
 from pbrdf.instruments.polarimeter.detector import Detector
+from pbrdf.instruments.polarimeter.mueller_polarimeter import Generator
 from pbrdf.instruments.polarimeter.polarimeter import Polarimeter
 
 __all__ = ["FRAME_FILES", "Instrument"]
@@ -35,6 +36,9 @@ class Instrument:
         flat field and dead pixels.
     folder
         Folder that relative names of files start from; None for the working directory.
+    generator
+        What polarises the light on the sample, for an instrument that measures Mueller matrices; None for one that
+        measures Stokes vectors.
     """
 
     polarimeter: Polarimeter
@@ -43,12 +47,21 @@ class Instrument:
     stability: float = 0.0
     frames: dict[str, Any] = field(default_factory=dict)
     folder: Path | None = None
+    generator: Generator | None = None
 
     def __post_init__(self) -> None:
         if not math.isfinite(self.reference_angle):
             raise DataError(f"the reference angle is {self.reference_angle!r}, it must be a finite number")
         if not (math.isfinite(self.stability) and self.stability >= 0.0):
             raise DataError(f"the stability is {self.stability!r}, it must be a number of 0 or more")
+
+    def require_stokes(self) -> None:
+        """Check that the instrument measures Stokes vectors; raises DataError."""
+        if self.generator is not None:
+            raise DataError(
+                f"{self.polarimeter.name}: its light changes from state to state, so that it measures Mueller matrices "
+                "and no Stokes vectors: pbrdf reduce makes data sets of its readings"
+            )
 
     def resolve(self, name: str | Path) -> Path:
         """Path of a file named in the instrument's tables."""

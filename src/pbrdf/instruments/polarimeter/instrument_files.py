@@ -24,8 +24,10 @@ from pbrdf.files.atomic import atomic_file
 from pbrdf.files.text import read_toml
 from pbrdf.instruments.polarimeter.analyzer_files import read_analyzer, write_analyzer
 from pbrdf.instruments.polarimeter.band import Band, cauchy, gaussian_band, in_band, read_band, top_hat_band
+from pbrdf.instruments.polarimeter.color_filters import BAYER, ColorFilters
 from pbrdf.instruments.polarimeter.detector import Detector
 from pbrdf.instruments.polarimeter.instrument import FRAME_FILES, Instrument
+from pbrdf.instruments.polarimeter.mueller_polarimeter import dual_rotating_retarder
 from pbrdf.instruments.polarimeter.polarimeter import Polarimeter, from_settings, measured
 from pbrdf.instruments.polarimeter.presets import preset
 from pbrdf.instruments.polarimeter.retardance_sets import retardance_set
@@ -33,16 +35,32 @@ from pbrdf.instruments.polarimeter.retardance_sets import retardance_set
 __all__ = ["load_instrument", "save_instrument"]
 
 _COMMON = ("kind", "name", "states", "accuracy", "reference_angle", "stability")
+_COLORS = ("colors", "wavelengths", "greens", "color")
 _KINDS: dict[str, tuple[str, ...]] = {
     "lcvr": ("axes", "retardances", "set", "analyzer", "diattenuation", "band"),
     "rotating_retarder": ("angles", "retardance", "analyzer", "diattenuation", "band"),
     "rotating_polarizer": ("angles", "diattenuation"),
-    "division_of_focal_plane": ("layout", "diattenuation"),
-    "measured": ("analyzer_file", "analyzer_vectors", "mosaic"),
-    "preset": ("preset",),
+    "dual_rotating_retarder": (
+        "angles",
+        "generator_angles",
+        "analyzer_angles",
+        "steps",
+        "step",
+        "ratio",
+        "retardance",
+        "generator_retardance",
+        "analyzer_retardance",
+        "polarizer",
+        "analyzer",
+        "diattenuation",
+        "generator_reference_angle",
+    ),
+    "division_of_focal_plane": ("layout", "diattenuation", *_COLORS),
+    "measured": ("analyzer_file", "analyzer_vectors", "mosaic", *_COLORS),
+    "preset": ("preset", *_COLORS),
 }
 _BAND = ("shape", "center", "width", "file", "reference", "birefringence")
-_DETECTOR = ("bits", "gain", "read_noise", "offset", "dark", "full_well")
+_DETECTOR = ("bits", "gain", "read_noise", "offset", "dark", "full_well", "full_scale", "alignment")
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
 
@@ -65,18 +83,24 @@ def load_instrument(path: str | Path) -> Instrument:
     if "polarimeter" not in content:
         raise DataError(f"{path}: there is no table [polarimeter]; it says what the instrument is, kind = …")
     table = top.table("polarimeter")
+    if isinstance(table.content.get("kind"), str):
+        table.content["kind"] = table.content["kind"].replace("-", "_")
     kind = table.choice("kind", _KINDS)
     table = _Table(path, "polarimeter", table.content, (*_COMMON, *_KINDS[kind]), f"the kind {kind!r}")
     try:
         if kind == "preset":
             name = table.text("preset")
             instrument = preset(name)
+        elif kind == "dual_rotating_retarder":
+            instrument = _dual_rotating_retarder(table)
         else:
             instrument = Instrument(_polarimeter(table, kind))
         instrument = replace(
             instrument,
             polarimeter=_described(table, instrument.polarimeter),
-            detector=_detector(path, content.get("detector", {}), instrument.detector),
+            detector=_detector(
+                path, content.get("detector", {}), instrument.detector, scaled=kind == "preset"
+            ),
             reference_angle=math.radians(table.number("reference_angle", 0.0)),
             stability=table.number("stability", instrument.stability),
         )
@@ -114,12 +138,23 @@ def save_instrument(instrument: Instrument, path: str | Path) -> None:
         table["accuracy"] = dict(zip(("linear", "circular"), map(float, polarimeter.accuracy), strict=True))
     table["reference_angle"] = _degrees(instrument.reference_angle)
     table["stability"] = float(instrument.stability)
-    if table["kind"] == "measured":
+    if instrument.generator is not None:
+        table |= instrument.generator.settings
+        table["generator_reference_angle"] = _degrees(instrument.generator.reference_angle)
+    elif table["kind"] == "measured":
         beside = path.with_name(f"{path.stem}_analyzer{'.nc' if polarimeter.is_map else '.csv'}")
         write_analyzer(polarimeter, beside)
         table["analyzer_file"] = beside.name
         if polarimeter.mosaic is not None:
             table["mosaic"] = polarimeter.mosaic.tolist()
+    if polarimeter.filters is not None:
+        table["colors"] = polarimeter.filters.layout
+        if polarimeter.filters.wavelengths:
+            table["wavelengths"] = dict(polarimeter.filters.wavelengths)
+        if polarimeter.filters.apart:
+            table["greens"] = "apart"
+        if polarimeter.filters.only is not None:
+            table["color"] = polarimeter.filters.only
     detector = {key: getattr(instrument.detector, key) for key in _DETECTOR}
     detector = {key: value for key, value in detector.items() if value is not None}
     frames = dict(instrument.frames)
@@ -240,6 +275,43 @@ def _polarimeter(table: _Table, kind: str) -> Polarimeter:
     return _in_band(table, polarimeter) if "band" in table.content else polarimeter
 
 
+def _dual_rotating_retarder(table: _Table) -> Instrument:
+    content = table.content
+    lists = {"generator_angles", "analyzer_angles"} & set(content)
+    ways = [bool("angles" in content), bool(lists), bool({"steps", "step", "ratio"} & set(content))]
+    if sum(ways) > 1:
+        raise DataError(
+            f"{table.path}: [polarimeter] give angles as pairs [[generator, analyser], …], or generator_angles and "
+            "analyzer_angles, or steps, step and ratio"
+        )
+    if "angles" in content:
+        pairs = table.numbers("angles", 2)
+        if pairs.shape[1] != 2:
+            raise table.wrong("angles", "pairs [[generator, analyser], …]")
+        first, second = pairs.T
+    elif lists:
+        first = table.numbers("generator_angles", 1)
+        second = table.numbers("analyzer_angles", 1) if "analyzer_angles" in content else 5.0 * first
+    else:
+        steps = table.number("steps", 36)
+        if steps != int(steps) or not 16 <= steps <= 100_000:
+            raise table.wrong("steps", "a whole number from 16")
+        first = table.number("step", 180.0 / steps) * np.arange(int(steps))
+        second = table.number("ratio", 5.0) * first
+    both = table.number("retardance", 90.0)
+    polarimeter, generator = dual_rotating_retarder(
+        np.deg2rad(first),
+        np.deg2rad(second),
+        generator_retardance=math.radians(table.number("generator_retardance", both)),
+        analyzer_retardance=math.radians(table.number("analyzer_retardance", both)),
+        polarizer=math.radians(table.number("polarizer", 0.0)),
+        analyzer=math.radians(table.number("analyzer", 0.0)),
+        diattenuation=table.number("diattenuation", 1.0),
+    )
+    turned = math.radians(table.number("generator_reference_angle", 0.0))
+    return Instrument(polarimeter, generator=replace(generator, reference_angle=turned))
+
+
 def _in_band(table: _Table, polarimeter: Polarimeter) -> Polarimeter:
     content = table.content["band"]
     if not isinstance(content, dict):
@@ -294,6 +366,8 @@ def _described(table: _Table, polarimeter: Polarimeter) -> Polarimeter:
         if not (isinstance(states, list) and all(isinstance(s, str) for s in states)):
             raise table.wrong("states", "a list of names in quotes, one for each state")
         polarimeter = replace(polarimeter, states=tuple(states))
+    if set(_COLORS) & set(table.content):
+        polarimeter = replace(polarimeter, filters=_filters(table, polarimeter.filters))
     if "accuracy" in table.content:
         content = table.content["accuracy"]
         if not isinstance(content, dict):
@@ -303,10 +377,40 @@ def _described(table: _Table, polarimeter: Polarimeter) -> Polarimeter:
     return polarimeter
 
 
-def _detector(path: Path, content: Any, default: Detector) -> Detector:
+def _filters(table: _Table, default: ColorFilters | None) -> ColorFilters:
+    """The colours over the cells of a mosaic."""
+    if default is None and "colors" not in table.content:
+        raise DataError(f"{table.path}: [polarimeter] say which colours there are: colors = {_value(BAYER)}")
+    made = default or ColorFilters()
+    if "colors" in table.content:
+        rows = table.content["colors"]
+        if not (isinstance(rows, list) and rows and all(isinstance(r, list) for r in rows)) or not all(
+            isinstance(name, str) for row in rows for name in row
+        ):
+            raise table.wrong("colors", f"rows of names, such as {_value(BAYER)}")
+        made = replace(made, layout=tuple(map(tuple, rows)))
+    if "wavelengths" in table.content:
+        content = table.content["wavelengths"]
+        if not isinstance(content, dict) or not all(_is_number(v) for v in content.values()):
+            raise table.wrong("wavelengths", "nanometres of each colour, { R = 610, G = 540, B = 460 }")
+        made = replace(made, wavelengths={name: float(v) for name, v in content.items()})
+    if "greens" in table.content:
+        made = replace(made, apart=table.choice("greens", ("joined", "apart")) == "apart")
+    if "color" in table.content:
+        made = replace(made, only=table.text("color"))
+    return made
+
+
+def _detector(path: Path, content: Any, default: Detector, *, scaled: bool) -> Detector:
     table = _Table(path, "detector", content, _DETECTOR, "the detector")
+    bits = content.get("bits")
+    if scaled and "gain" not in content and isinstance(bits, int) and 1 <= bits <= 16:
+        # the same electrons over more or fewer numbers
+        default = replace(default, gain=default.gain * 2.0 ** (default.bits - bits))
     for key, value in table.content.items():
-        if not _is_number(value):
+        if key == "alignment":
+            table.choice(key, ("left", "right"))
+        elif not _is_number(value):
             raise table.wrong(key, "a number")
     try:
         return replace(default, **table.content)

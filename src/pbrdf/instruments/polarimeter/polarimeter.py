@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pbrdf.errors import DataError
+from pbrdf.instruments.polarimeter.color_filters import ColorFilters
 from pbrdf.instruments.polarimeter.stokes_solution import BLOCK, determined_components, row_space
 from pbrdf.optics.elements import diattenuator, retarder, rotate_frame
 
@@ -51,6 +52,8 @@ class Polarimeter:
     details
         What it was made from, for reports and files: the kind and its settings as :func:`from_settings` takes them
         (angles in degrees), and notes of what happened to it since.
+    filters
+        For a mosaic: the colours over its cells, if the camera is one for colours.
 
     Raises
     ------
@@ -64,6 +67,7 @@ class Polarimeter:
     mosaic: np.ndarray | None = None
     accuracy: tuple[float, float] = (0.0, 0.0)
     details: dict[str, Any] = field(default_factory=dict)
+    filters: ColorFilters | None = None
 
     def __post_init__(self) -> None:
         analyzer = np.asarray(self.analyzer, dtype=float)
@@ -90,6 +94,8 @@ class Polarimeter:
                 raise DataError(
                     "the mosaic is a table that holds each state of the polarimeter (0, 1, …) once"
                 )
+        if self.filters is not None and self.mosaic is None:
+            raise DataError("colours stand over the cells of a mosaic, and this polarimeter has none")
         accuracy = tuple(float(a) for a in self.accuracy)
         object.__setattr__(self, "accuracy", accuracy)
         if len(accuracy) != 2 or not all(np.isfinite(a) and a >= 0.0 for a in accuracy):

@@ -9,6 +9,9 @@
     Applied Optics 52, 1284 (2013)). The two publications disagree; which holds cannot be decided from them.
 ``sony_imx250mzr``
     A camera with wire-grid polarisers on its pixels, cell [[90°, 45°], [135°, 0°]]; it does not see V.
+``sony_imx250myr``, ``sony_imx264myr``
+    The same under a Bayer mosaic, a colour for each cell of polarisers
+    (:mod:`pbrdf.instruments.polarimeter.color_filters`): every picture gives one series for each of R, G and B.
 
 The retardances of the paper's imager are not published: the tetrahedral set stands in for them. Its detector is not
 named either; the intensities in digital numbers (20 of them at most, called 17 % of the largest value) suggest eight
@@ -18,10 +21,12 @@ bits, and gain and read noise are those of a common CCD (about 20 000 electrons 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
 from pbrdf.errors import DataError
+from pbrdf.instruments.polarimeter.color_filters import ColorFilters
 from pbrdf.instruments.polarimeter.detector import Detector
 from pbrdf.instruments.polarimeter.instrument import Instrument
 from pbrdf.instruments.polarimeter.polarimeter import division_of_focal_plane, lcvr
@@ -50,11 +55,19 @@ def _sony() -> Instrument:
     return Instrument(division_of_focal_plane(np.deg2rad([[90.0, 45.0], [135.0, 0.0]])), detector)
 
 
+def _sony_color() -> Instrument:
+    grey = _sony()
+    name = "division of focal plane in colours"
+    return replace(grey, polarimeter=replace(grey.polarimeter, name=name, filters=ColorFilters()))
+
+
 #: Makers of the built-in instruments.
 PRESETS: dict[str, Callable[[], Instrument]] = {
     "paper": _paper,
     "conservative": _conservative,
     "sony_imx250mzr": _sony,
+    "sony_imx250myr": _sony_color,
+    "sony_imx264myr": _sony_color,
 }
 
 

@@ -106,34 +106,42 @@ def solve_stokes(
 
 
 def solve_block(
-    values: np.ndarray, variance: np.ndarray, analyzer: np.ndarray, projector: np.ndarray, weighted: bool
+    values: np.ndarray,
+    variance: np.ndarray,
+    analyzer: np.ndarray,
+    projector: np.ndarray,
+    weighted: bool,
+    spread: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """The shortest least-squares solution, and its covariance, of pixels whose numbers are all good.
 
     Shapes: (N, P) twice, (N, 4) or (P, N, 4) analyser vectors with (4, 4) or (P, 4, 4) projectors; returns (4, P) and
-    (4, 4, P), with numbers in what is not determined too.
+    (4, 4, P), with numbers in what is not determined too. `spread`, of the shape of the variance, is what the values
+    really vary by if the variance only weighs them.
     """
+    spread = variance if spread is None else spread
+    own_spread = spread is not variance
     if analyzer.ndim == 2 and not weighted:
         inverse = np.linalg.pinv(analyzer, rcond=RANK_TOLERANCE)
         outer = (inverse[:, None] * inverse[None]).reshape(16, -1)
-        return inverse @ values, (outer @ variance).reshape(4, 4, -1)
+        return inverse @ values, (outer @ spread).reshape(4, 4, -1)
     W = analyzer[:, :, None] if analyzer.ndim == 2 else np.ascontiguousarray(analyzer.transpose(1, 2, 0))
     missing = np.eye(4)[:, :, None] - (
         projector[:, :, None] if projector.ndim == 2 else projector.transpose(1, 2, 0)
     )
     weights = 1.0 / variance if weighted else np.ones((len(values), 1))
     inverse, hard = _pseudo_inverse(W, weights, missing)
-    if weighted:
+    if weighted and not own_spread:
         right = np.stack([(W[:, a] * weights * values).sum(axis=0) for a in range(4)])
         solution, covariance = np.einsum("abp,bp->ap", inverse, right), inverse
     else:
-        matrix = np.einsum("abp,nbp->anp", inverse, W)
+        matrix = np.einsum("abp,nbp->anp", inverse, W) * weights
         solution = np.einsum("anp,np->ap", matrix, values)
-        covariance = np.einsum("anp,np,bnp->abp", matrix, variance, matrix)
+        covariance = np.einsum("anp,np,bnp->abp", matrix, spread, matrix)
     for p in np.flatnonzero(hard).tolist():
         own, root, gap = (_pixel(array, p) for array in (W, np.sqrt(weights), missing))
         inverse = _graded_inverse(own, root, gap)
-        solution[:, p], covariance[:, :, p] = inverse @ values[:, p], (inverse * variance[:, p]) @ inverse.T
+        solution[:, p], covariance[:, :, p] = inverse @ values[:, p], (inverse * spread[:, p]) @ inverse.T
     return solution, covariance
 
 

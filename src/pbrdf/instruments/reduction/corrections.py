@@ -9,21 +9,24 @@ whole Stokes vector. Both are common to all series too, which the covariance of 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
 from pbrdf.errors import DataError
+from pbrdf.instruments.frames.digital_numbers import require_range, shifted
+from pbrdf.instruments.frames.exposures import combine
 from pbrdf.instruments.frames.frame_files import open_picture
 from pbrdf.instruments.frames.frame_layout import FrameLayout
-from pbrdf.instruments.frames.frames import Frames, require_raw
+from pbrdf.instruments.frames.frames import ColorCells, Frames, color_cells_of, require_raw, shift_of
 from pbrdf.instruments.frames.mosaic import split_mosaic
 from pbrdf.instruments.polarimeter.instrument import Instrument
 from pbrdf.instruments.polarimeter.stokes_solution import solve_stokes
 from pbrdf.instruments.reduction.stokes_image import StokesImage, reduce_frames
 
-__all__ = ["Corrections", "PixelLevels", "reduce_rows", "require_range"]
+__all__ = ["Corrections", "PixelLevels", "reduce_rows"]
 
 #: Rows of the flat field that are worked on at a time.
 _ROWS = 128
@@ -149,6 +152,15 @@ class PixelLevels:
     response: np.ndarray | float
     dead: np.ndarray | None
 
+    def part(self, cells: ColorCells) -> PixelLevels:
+        """Those of one kind of cell of a colour mosaic."""
+
+        def part(values: np.ndarray | float) -> np.ndarray | float:
+            return cells.parts(values)[0] if isinstance(values, np.ndarray) else values
+
+        dead = None if self.dead is None else cells.parts(self.dead)[0]
+        return PixelLevels(part(self.level), part(self.light), part(self.response), dead)
+
     @property
     def black(self) -> np.ndarray | None:
         """The level as :func:`pbrdf.instruments.reduction.stokes_image.reduce_frames` takes it; None: its own."""
@@ -160,30 +172,30 @@ class PixelLevels:
         return _of_pixels(self.response) if isinstance(self.response, np.ndarray) else None
 
 
-def require_range(raw: np.ndarray, instrument: Instrument) -> None:
-    """Check that raw digital numbers are within the range of the detector's converter; raises DataError."""
-    detector = instrument.detector
-    top = 2**detector.bits - 1
-    if raw.dtype.itemsize == 1 and detector.bits > 8:
-        raise DataError(f"its numbers have 8 bits, but [detector] says bits = {detector.bits}")
-    if raw.size and int(raw.max()) > top:
-        raise DataError(
-            f"a pixel reads {int(raw.max())}, but {detector.bits} bits end at {top}: set bits in [detector]"
-        )
-
-
 def _read(key: str, path: Path | None, instrument: Instrument, frames: Frames) -> np.ndarray | None:
     if path is None:
         return None
-    picture = open_picture(path)
+    picture = open_picture(path, FrameLayout.from_table(instrument.frames, instrument.folder).raw)
     raw = picture.read(0, 0, picture.rows)
     if key != "dead_pixels":
-        require_raw(raw.dtype, f"{path}: the {key.replace('_', ' ')}")
+        exposures = f"{key.split('_')[0]}_exposures"
+        what = f"{path}: the {key.replace('_', ' ')}"
+        require_raw(raw.dtype, what, means=True)
+        if raw.dtype.kind == "f" and exposures not in instrument.frames:
+            raise DataError(
+                f"{what} holds numbers of the type {raw.dtype}, as means of several exposures are: say of how many in "
+                f"[frames], {exposures} = 100"
+            )
+        try:
+            raw = shifted(raw, shift_of(frames))
+        except DataError as error:
+            raise DataError(f"{path}: {error}") from None
     seen = raw if instrument.polarimeter.mosaic is None else split_mosaic(raw[0], instrument.polarimeter)
-    if seen.shape[1:] != (frames.rows, frames.columns):
+    tall, wide = color_cells_of(frames, 0).size
+    if seen.shape[1:] != (frames.rows * tall, frames.columns * wide):
         raise DataError(
             f"{path}: {seen.shape[1]} × {seen.shape[2]} pixels (rows × columns), but the frames have "
-            f"{frames.rows} × {frames.columns}"
+            f"{frames.rows * tall} × {frames.columns * wide}"
         )
     return seen
 
@@ -194,6 +206,7 @@ def reduce_rows(
     corrections: Corrections,
     rows: tuple[int, int, int],
     *,
+    cells: ColorCells | None = None,
     dark_level: float = 0.0,
     weighted: bool = True,
 ) -> StokesImage:
@@ -202,11 +215,13 @@ def reduce_rows(
     Parameters
     ----------
     raw
-        Raw digital numbers, shape (N, last − first, columns).
+        What :meth:`pbrdf.instruments.frames.frames.Frames.read` gives of these rows.
     instrument, corrections
         What took them.
     rows
         First row, last row (not included), and the number of rows of the whole picture.
+    cells
+        Which cells of a colour mosaic to reduce; those of one colour are averaged.
     dark_level, weighted
         See :func:`pbrdf.instruments.reduction.stokes_image.reduce_frames`.
 
@@ -215,29 +230,76 @@ def reduce_rows(
     DataError
         If the numbers are not those of the detector's converter.
     """
-    first, last, total = rows
-    detector, polarimeter = instrument.detector, instrument.polarimeter
-    require_range(raw, instrument)
-    here = slice(first, last)
+    require_range(raw, instrument.detector)
+    cells = cells or ColorCells()
+    tall = cells.size[0]
+    first, last, total = (tall * row for row in rows)
+    polarimeter = instrument.polarimeter
     analyzer = (
-        polarimeter.spread(total, raw.shape[2], first, last) if polarimeter.is_map else polarimeter.analyzer
+        polarimeter.spread(total, raw.shape[-1], first, last) if polarimeter.is_map else polarimeter.analyzer
     )
-    pixels = corrections.pixels(instrument, here)
+    pixels = corrections.pixels(instrument, slice(first, last))
+    flat = None if corrections.flat is None else corrections.flat[:, first:last]
+    images = []
+    for place in cells.places:
+        one = ColorCells(cells.size, (place,))
+        part = analyzer
+        if analyzer.ndim > 2:
+            part = np.moveaxis(one.parts(np.moveaxis(analyzer, (2, 3), (0, 1)))[0], (0, 1), (2, 3))
+        images.append(
+            _reduced(
+                one.parts(raw)[0],
+                instrument,
+                corrections,
+                pixels.part(one),
+                None if flat is None else one.parts(flat)[0],
+                part,
+                dark_level,
+                weighted,
+            )
+        )
+    return images[0] if len(images) == 1 else _averaged(images)
+
+
+def _averaged(images: Sequence[StokesImage]) -> StokesImage:
+    """The mean of several cells of the same colour; what is wrong with one is wrong with all."""
+    flags = np.bitwise_or.reduce([image.flags for image in images])
+    count = len(images)
+    return StokesImage(
+        np.sum([image.stokes for image in images], axis=0) / count,
+        np.sum([image.covariance for image in images], axis=0) / count**2,
+        flags,
+    )
+
+
+def _reduced(
+    raw: np.ndarray,
+    instrument: Instrument,
+    corrections: Corrections,
+    pixels: PixelLevels,
+    flat: np.ndarray | None,
+    analyzer: np.ndarray,
+    dark_level: float,
+    weighted: bool,
+) -> StokesImage:
+    """Stokes parameters of pixels, all alike in colour."""
+    detector, polarimeter = instrument.detector, instrument.polarimeter
+    reading = combine(raw, detector, corrections.layout.exposures or 1)
     level, light, response = pixels.level, pixels.light, pixels.response
     level_variance: np.ndarray | float = 0.0
     if corrections.dark is not None:
         level_variance = detector.variance(level) / corrections.layout.dark_exposures
     flat_variance: np.ndarray | float = 0.0
-    if corrections.flat is not None:
-        flat_variance = detector.variance(corrections.flat[:, here]) / corrections.layout.flat_exposures
+    if flat is not None:
+        flat_variance = detector.variance(flat) / corrections.layout.flat_exposures
     # The dark frame is taken from the flat field too: what it adds there counts against what it takes here.
     own: np.ndarray | None = None
     independent = polarimeter.mosaic is not None
-    if independent and (corrections.dark is not None or corrections.flat is not None):
-        share = (raw - level) / light
+    if independent and (corrections.dark is not None or flat is not None):
+        share = (reading.numbers - level) / light
         own = (level_variance * (1.0 - share) ** 2 + flat_variance * share**2) / np.square(response)
     image = reduce_frames(
-        raw,
+        reading,
         polarimeter,
         detector,
         dead=pixels.dead,
@@ -249,9 +311,9 @@ def reduce_rows(
         extra_variance=own,
     )
     if not independent and corrections.dark is not None:
-        taken = _all_states_alike(raw.shape, 1.0 / np.asarray(response), analyzer)
+        taken = _all_states_alike(reading.numbers.shape, 1.0 / np.asarray(response), analyzer)
         _add(image, taken - image.stokes / light, level_variance)
-    if not independent and corrections.flat is not None:
+    if not independent and flat is not None:
         _add(image, image.stokes / light, flat_variance)
     return image
 

@@ -80,7 +80,7 @@ class DatasetCollector(RegionCollector):
     frames, instrument
         What was measured, and with what.
     angles
-        One row for each series, in any order.
+        One row for each series, in any order; of a colour camera one for each picture will do.
 
     Raises
     ------
@@ -92,6 +92,7 @@ class DatasetCollector(RegionCollector):
         self, regions: Mapping[str, Region], frames: Frames, instrument: Instrument, angles: AngleTable
     ) -> None:
         super().__init__(regions, frames, instrument)
+        angles = angles.for_frames(frames)
         _require_same_series(frames.names, angles)
         self._table = angles.rows(frames.names)
 

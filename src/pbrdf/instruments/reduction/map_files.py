@@ -257,7 +257,7 @@ def _head(
     }
     reference = np.rad2deg(instrument.reference_angle)
     if angles is not None:
-        table = angles.rows(frames.names)
+        table = angles.for_frames(frames).rows(frames.names)
         for name in ("theta_i", "theta_r", "phi", "sample_angle"):
             coords[name] = ("series", np.rad2deg(getattr(table, name)), {"units": "degree"})
         own = np.rad2deg(table.reference_angle)

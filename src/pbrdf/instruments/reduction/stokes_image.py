@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pbrdf.errors import DataError
+from pbrdf.instruments.frames.exposures import Reading, single
 from pbrdf.instruments.polarimeter.detector import Detector
 from pbrdf.instruments.polarimeter.polarimeter import Polarimeter
 from pbrdf.instruments.polarimeter.stokes_solution import BLOCK, blank, row_space, solve_block
@@ -69,6 +70,7 @@ def flag_pixels(
     dead: ArrayLike | None = None,
     dark_level: float = 0.0,
     black: ArrayLike | None = None,
+    saturated: np.ndarray | None = None,
 ) -> np.ndarray:
     """Which pixels must not be used, and why.
 
@@ -82,6 +84,8 @@ def flag_pixels(
         A pixel is dark if its mean signal over the states does not exceed this many digital numbers.
     black
         Digital numbers of each pixel without light, shape (...) or (N, ...); by default the detector's black level.
+    saturated
+        Where the frames are saturated, bool, shape (N, ...); by default what the detector says of their numbers.
 
     Returns
     -------
@@ -109,7 +113,7 @@ def flag_pixels(
         dead = np.asarray(dead, dtype=bool)
         broken |= dead.any(axis=0) if dead.shape == frames.shape else dead
     found = {
-        PixelFlag.SATURATED: detector.saturated(frames).any(axis=0),
+        PixelFlag.SATURATED: (detector.saturated(frames) if saturated is None else saturated).any(axis=0),
         PixelFlag.DEAD: broken,
         PixelFlag.DARK: dark & ~broken,
     }
@@ -120,7 +124,7 @@ def flag_pixels(
 
 
 def reduce_frames(
-    frames: ArrayLike,
+    frames: ArrayLike | Reading,
     polarimeter: Polarimeter,
     detector: Detector,
     *,
@@ -131,6 +135,7 @@ def reduce_frames(
     black: ArrayLike | None = None,
     flat: ArrayLike | None = None,
     extra_variance: ArrayLike | None = None,
+    exposures: int = 1,
 ) -> StokesImage:
     """Reduce raw frames pixel by pixel.
 
@@ -143,7 +148,8 @@ def reduce_frames(
     ----------
     frames
         Raw digital numbers, shape (N, ...): one frame a state (for a mosaic: after
-        :func:`pbrdf.instruments.frames.mosaic.split_mosaic`).
+        :func:`pbrdf.instruments.frames.mosaic.split_mosaic`); or a
+        :class:`~pbrdf.instruments.frames.exposures.Reading` of them.
     polarimeter, detector
         What took them.
     dead, dark_level
@@ -159,6 +165,8 @@ def reduce_frames(
         Response of each pixel relative to the others, shape (...) or (N, ...): the signal is divided by it.
     extra_variance
         Of the signal beyond what the detector knows of, digital numbers squared, shape (...) or (N, ...).
+    exposures
+        How many exposures the frames are the mean of; a reading knows itself.
 
     Raises
     ------
@@ -166,7 +174,8 @@ def reduce_frames(
         If the number of frames is not the number of states, shapes do not agree, or the flat field is not positive at a
         pixel that is used.
     """
-    frames = np.asarray(frames)
+    reading = frames if isinstance(frames, Reading) else single(np.asarray(frames), detector, exposures)
+    frames = reading.numbers
     if frames.shape[:1] != (polarimeter.size,):
         raise DataError(
             f"{frames.shape[0] if frames.ndim else 0} frames for the {polarimeter.size} states of {polarimeter.name}"
@@ -179,8 +188,11 @@ def reduce_frames(
                 "pictures, or the analyser vectors of the pixels"
             )
         analyzer = polarimeter.spread(*shape) if polarimeter.is_map else polarimeter.analyzer
-    flags = flag_pixels(frames, detector, dead=dead, dark_level=dark_level, black=black)
+    flags = flag_pixels(
+        frames, detector, dead=dead, dark_level=dark_level, black=black, saturated=reading.saturated
+    )
     raw = frames.reshape(len(frames), -1)
+    scatter = None if reading.scatter is None else reading.scatter.reshape(raw.shape)
     level = _of_pixels("the black level", detector.black if black is None else black, frames.shape)
     response = _of_pixels("the flat field", 1.0 if flat is None else flat, frames.shape)
     # a dark pixel is solved for where that is possible
@@ -207,9 +219,13 @@ def reduce_frames(
             start, _ = solve_block(signal, np.ones_like(signal), vectors, projector, False)
             expected = np.einsum("nk,kp->np" if vectors.ndim == 2 else "pnk,kp->np", vectors, start)
             numbers = np.maximum(expected, 0.0) * gain + zero
-        variance = np.where(out, 1.0, detector.variance(numbers) / gain**2 + extra[:, block])
+        noise = detector.variance(numbers) * reading.share + reading.rounding
+        variance = np.where(out, 1.0, noise / gain**2 + extra[:, block])
+        spread = None
+        if scatter is not None:
+            spread = np.where(out, 1.0, scatter[:, block] / gain**2 + extra[:, block])
         stokes[:, block], covariance[:, :, block] = solve_block(
-            signal, variance, vectors, projector, overdetermined
+            signal, variance, vectors, projector, overdetermined, spread
         )
         blank(stokes[:, block], covariance[:, :, block], projector, out)
     return StokesImage(stokes.reshape(4, *shape), covariance.reshape(4, 4, *shape), flags)

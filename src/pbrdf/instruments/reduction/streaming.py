@@ -12,7 +12,7 @@ from typing import TypeVar
 import numpy as np
 
 from pbrdf.errors import DataError
-from pbrdf.instruments.frames.frames import Frames
+from pbrdf.instruments.frames.frames import Frames, color_cells_of, layers_of
 from pbrdf.instruments.polarimeter.instrument import Instrument
 from pbrdf.instruments.reduction.corrections import Corrections, reduce_rows
 from pbrdf.instruments.reduction.stokes_image import StokesImage
@@ -96,13 +96,15 @@ def reduced_blocks(
             f"{frames.states} frames a series for the {instrument.polarimeter.size} states of "
             f"{instrument.polarimeter.name}"
         )
+    instrument.require_stokes()
     instrument.polarimeter.require_intensity()
     corrections = Corrections.of(instrument, frames)
     top, bottom = rows if rows is not None else (0, frames.rows)
     threads, high = _shares(frames, max_memory)
     # An eighth of the memory for raw frames, of which two parts may be there at a time. Many rows are read at once, as
     # some pictures must be decoded whole for every reading.
-    slab = max(max_memory // (8 * 2 * frames.states * frames.columns) // high, 1) * high
+    pictures = frames.states * layers_of(frames)
+    slab = max(max_memory // (8 * 2 * pictures * frames.columns) // high, 1) * high
 
     def work(raw: np.ndarray, series: int, first: int, last: int) -> T:
         try:
@@ -111,6 +113,7 @@ def reduced_blocks(
                 instrument,
                 corrections,
                 (first, last, frames.rows),
+                cells=color_cells_of(frames, series),
                 dark_level=dark_level,
                 weighted=weighted,
             )
@@ -123,9 +126,10 @@ def reduced_blocks(
             for first in range(top, bottom, slab):
                 last = min(first + slab, bottom)
                 raw = frames.read(series, first, last)
+                tall = raw.shape[-2] // (last - first)
                 for row in range(first, last, high):
                     end = min(row + high, last)
-                    yield raw[:, row - first : end - first], series, row, end
+                    yield raw[..., (row - first) * tall : (end - first) * tall, :], series, row, end
 
     total = (bottom - top) * len(frames.names)
     finished = 0
@@ -155,7 +159,8 @@ def _shares(frames: Frames, max_memory: int) -> tuple[int, int]:
     threads = min(os.cpu_count() or 1, _MOST_THREADS)
     while True:
         # a third of the memory: a block in each thread, as many that wait, and one that is being used
-        pixel = threads * (_BYTES_PER_PIXEL + _BYTES_PER_STATE * frames.states) + (threads + 1) * _BYTES_DONE
+        states = frames.states * layers_of(frames)
+        pixel = threads * (_BYTES_PER_PIXEL + _BYTES_PER_STATE * states) + (threads + 1) * _BYTES_DONE
         fits = max_memory // (3 * pixel)
         if fits >= _FEW_PIXELS or threads == 1:
             return threads, max(min(fits, _PIXELS) // frames.columns, 1)

@@ -59,6 +59,16 @@ def _parts(made: InstrumentCalibration) -> Iterator[RenderableType]:
         noise = dict(zip(("linear", "circular"), map(per_cent, made.noise), strict=True))
         words = ", ".join(f"{k} {v}" for k, v in noise.items() if v != "–")
         yield f"The noise of these readings alone makes: {words}."
+    known = made.inputs.accuracy
+    if any(known):
+        written = polarimeter.accuracy
+        circular = (
+            f", circular {per_cent(known[1])} and {per_cent(written[1])}" if polarimeter.determined[3] else ""
+        )
+        yield (
+            f"The light itself is known to {per_cent(known[0])} of Q and U, which all inputs share; with it the "
+            f"accuracy written is {per_cent(written[0])}{circular}."
+        )
     yield merit_table({"calibrated": polarimeter, "nominal": made.nominal})
     intensity, linear, circular = (per_cent(share) for share in made.difference)
     yield (

@@ -19,11 +19,12 @@ from pbrdf.instruments.reduction.reduce import Sink, reduce
 from pbrdf.instruments.reduction.region_averages import RegionAverage, RegionCollector
 from pbrdf.instruments.reduction.regions import Rectangle, Region
 from pbrdf.instruments.reduction.streaming import DEFAULT_MEMORY
+from pbrdf.rendering.picture_regions import PictureSeries, picture_averages, picture_dataset
 from pbrdf.report.reduction.gallery import Gallery, safe_name
 from pbrdf.report.reduction.summary import write_averages
 from pbrdf.version import __version__
 
-__all__ = ["WHOLE_PICTURE", "Reduction", "Wanted", "write_reduction"]
+__all__ = ["WHOLE_PICTURE", "Reduction", "Wanted", "write_picture_reduction", "write_reduction"]
 
 #: What tables call the average over all pixels.
 WHOLE_PICTURE = "(whole picture)"
@@ -141,6 +142,50 @@ def write_reduction(
                 names.append(f"{file_names[region]}{wanted.datasets}")
                 write(dataset, temporary / names[-1])
         names += gallery.files
+    return Reduction(averages, [directory / n for n in names])
+
+
+def write_picture_reduction(
+    series: PictureSeries,
+    regions: Mapping[str, Region],
+    directory: Path,
+    *,
+    angles: AngleTable | None,
+    suffix: str,
+    name: str,
+) -> Reduction:
+    """Average regions of rendered pictures and write ``summary.csv``, and with angles a data set for each region.
+
+    Parameters
+    ----------
+    series
+        The pictures.
+    regions
+        Parts of them by name.
+    directory
+        The folder.
+    angles
+        Of the series, or None.
+    suffix
+        Extension of the data sets.
+    name
+        What to call the pictures.
+
+    Raises
+    ------
+    DataError
+        If the input does not fit together or the folder cannot be written.
+    """
+    averages = picture_averages(series, regions)
+    names = ["summary.csv"]
+    with atomic_folder(directory, fill=True) as temporary:
+        write_averages(averages, series.names, temporary / names[0])
+        if angles is not None:
+            file_names = _file_names(regions)
+            for region, means in averages.items():
+                names.append(f"{file_names[region]}{suffix}")
+                attrs = {"title": f"region {region}", "source": f"{name}, averaged by pbrdf {__version__}"}
+                write(picture_dataset(series, means, angles, attrs=attrs), temporary / names[-1])
     return Reduction(averages, [directory / n for n in names])
 
 
