@@ -33,7 +33,8 @@ __all__ = [
 #: Entry points of this group are readers: the name is that of the format, the object a ``Reader``.
 GROUP = "pbrdf.readers"
 
-#: The modules of the formats of this package, each with its declaration, ``READER``.
+#: The modules of the formats of this package, each with its declaration, ``READER``. By name, because that of readings
+#: stands a floor above, where they are reduced.
 _OWN = {
     "csv": "pbrdf.data.formats.csv_table.reading",
     "netcdf": "pbrdf.data.formats.netcdf",
@@ -42,6 +43,7 @@ _OWN = {
     "cornell": "pbrdf.data.formats.cornell",
     "pbsdf": "pbrdf.data.formats.pbsdf",
     "merl": "pbrdf.data.formats.merl",
+    "readings": "pbrdf.instruments.reduction.reading_tables",
 }
 _registered: dict[str, Reader] = {}
 
@@ -89,13 +91,15 @@ def read(
         For CSV: the file's column names by the names used here, see
         :func:`pbrdf.data.formats.csv_table.reading.read_csv`.
     format
-        ``"csv"``, ``"netcdf"``, ``"zarr"``, ``"scatmech"``, ``"cornell"``, ``"pbsdf"``, ``"merl"`` or one that was
-        added (:func:`register_reader`); None finds it out from the extension and the content.
+        ``"csv"``, ``"netcdf"``, ``"zarr"``, ``"scatmech"``, ``"cornell"``, ``"pbsdf"``, ``"merl"``, ``"readings"`` or
+        one that was added (:func:`register_reader`); None finds it out from the extension and the content.
     **options
         Options of the format's reader: for ``"csv"`` those of :func:`pbrdf.data.formats.csv_table.reading.read_csv`
         (`where`, `skip_invalid`, `quantity`, `azimuth`, `stokes`, `illumination`, `cosine_weighted`,
-        `angles`); for ``"scatmech"``, ``"cornell"`` and ``"pbsdf"`` `wavelength` in nm, one or several; for
-        ``"pbsdf"`` and ``"merl"`` `every`, see :func:`pbrdf.data.formats.pbsdf.read_pbsdf`.
+        `angles`); for ``"readings"``, readings behind an analyser, the same and `analyzer`
+        (:mod:`pbrdf.instruments.reduction.reading_tables`); for ``"scatmech"``, ``"cornell"`` and ``"pbsdf"``
+        `wavelength` in nm, one or several; for ``"pbsdf"`` and ``"merl"`` `every`, see
+        :func:`pbrdf.data.formats.pbsdf.read_pbsdf`.
 
     Returns
     -------
