@@ -14,6 +14,7 @@ from numpy.testing import assert_allclose
 import pbrdf
 from pbrdf.data.paints import load_paint, open_experiment
 from pbrdf.errors import DataError
+from pbrdf.instruments.reduction.reading_columns import holds_readings
 
 RNG = np.random.default_rng(7)
 
@@ -120,11 +121,15 @@ def said(ds):
         "I₀ I₄₅ I₉₀ I₁₃₅",
         "analyzer_0 analyzer_45 analyzer_90 analyzer_135",
         "i0_deg i45_deg i90_deg i135_deg",
-        "I180 I225 I90 I315",
+        "I135 I90 I45 I180",
+        "I_0deg_mean I_45deg_mean I_90deg_mean I_135deg_mean",
+        "I_x I_45 I_y I_135",
+        "I∥ I45 I⊥ I135",
     ],
 )
 def test_names_of_linear_states(table, names):
-    ds = pbrdf.read(table(wide(linear(names.split()))))
+    angles = (135, 90, 45, 180) if names.startswith("I135") else (0, 45, 90, 135)
+    ds = pbrdf.read(table(wide(linear(names.split(), angles))))
     assert_allclose(stokes_of(ds), STOKES[:, :3], atol=1e-12)
     assert "V" not in ds
     assert_allclose(np.rad2deg(ds["theta_r"]), VIEWS)
@@ -209,6 +214,17 @@ def test_states_of_a_file_of_an_instrument(table, tmp_path, kind):
     assert_allclose(stokes_of(pbrdf.read(table(text))), STOKES[:, :3], atol=1e-9)
 
 
+def test_states_of_an_instrument_that_are_called_as_stokes_parameters_often_are(table, tmp_path):
+    """s1 … s4 of a tetrahedral set of retarders; the example of docs/instruments.md."""
+    imager = pbrdf.lcvr(pbrdf.retardance_set("tetrahedron"))
+    (tmp_path / "own.toml").write_text("[polarimeter]\nkind = 'lcvr'\nset = 'tetrahedron'\n")
+    values = dict(zip(imager.states, imager.analyzer, strict=True))
+    states = {name: (lambda s, w=w: float(w @ s)) for name, w in values.items()}
+    assert list(states) == ["s1", "s2", "s3", "s4"]
+    ds = pbrdf.read(table(wide(states, header="# analyzer_states: own.toml")))
+    assert_allclose(stokes_of(ds, "IQUV"), STOKES, atol=1e-12)
+
+
 # --- where the angles count from ------------------------------------------------------------------------
 
 
@@ -228,11 +244,11 @@ def test_where_the_angle_counts_from(table, header, angle_from_p):
     text = wide(linear(names, [angle_from_p(a) for a in angles]), header=header)
     ds = pbrdf.read(table(text))
     assert_allclose(stokes_of(ds), STOKES[:, :3], atol=1e-12)
-    assert "angle 0" not in said(ds)
+    assert "analyser's angle 0" not in said(ds)
 
 
 def test_an_unstated_zero_is_said(table):
-    assert "analyser's angle 0 lies; p was assumed" in said(
+    assert "analyser's angle 0 (H) lies; p was assumed" in said(
         pbrdf.read(table(wide(linear(["I0", "I45", "I90"], (0, 45, 90)))))
     )
 
@@ -242,7 +258,7 @@ def test_s_and_p_need_no_zero_and_leave_u_open(table):
     assert_allclose(stokes_of(ds, "IQ"), STOKES[:, :2], atol=1e-12)
     assert "U" not in ds
     assert "do not determine U" in said(ds)
-    assert "angle 0" not in said(ds)
+    assert "analyser's angle 0" not in said(ds)
 
 
 def test_light_of_the_source_in_the_files_axes(table):
@@ -529,6 +545,9 @@ def test_a_detector_at_its_end_is_named(table):
         "theta_i,theta_r,I0,I1,I2,I3",
         "theta_i,0,10,20,30,40,50,60,70",
         "theta_i,I_0,I_30,I_60",
+        "theta_i,theta_r,I0_1,I0_2,I90_1,I90_2",
+        "theta_i,theta_r,I_0_0,I_0_90,I_90_0,I_90_90",
+        "theta_i,theta_r,p_x,p_y,p_z",
         "theta_i,theta_r,0,45,90,135,180",
         "theta_i,theta_r,400,450,500",
         "theta_i,theta_r,I_450,I_550,I_650",
@@ -543,8 +562,6 @@ def test_a_detector_at_its_end_is_named(table):
     ],
 )
 def test_other_tables_are_left_alone(names):
-    from pbrdf.instruments.reduction.reading_columns import holds_readings
-
     assert not holds_readings(names.split(","))
 
 
@@ -584,6 +601,9 @@ def test_polarisation_that_was_computed_beside_the_readings_is_not_used(table):
             {"analyzer": {"states": "I0=pol 0;B=pol 2"}},
             "no column 'b'",
         ),
+        ("theta_i,theta_r,I0,I90,I180,I270\n1,2,3,4,5,6\n", {}, "analyser or for azimuths"),
+        ("theta_i,theta_r,I0,I90,dark\n1,2,3,4,\n", {}, "column 'dark' is empty"),
+        ("# analyzer_zer: s\ntheta_i,theta_r,I0,I90\n1,2,3,4\n", {}, "did you mean 'zero'"),
         ("theta_i,theta_r,brdf\n1,2,3\n", {"format": "readings"}, "no readings behind an analyser"),
         (
             "theta_i,theta_r,analyzer,reading\n1,2,0,3\n1,3,90,4\n",
@@ -623,6 +643,23 @@ def test_rows_can_be_selected_and_left_out(table):
     ds = pbrdf.read(table(text), where={"sample": "blue"}, skip_invalid=True)
     assert_allclose(ds["I"], [11.0])
     assert ds.attrs["skipped_rows"] == 1
+
+
+def test_a_full_turn_of_the_polariser(table):
+    """0° to 360° in steps of 30°, once it is said that these are no azimuths."""
+    angles = tuple(range(0, 361, 30))
+    text = wide(linear([f"I{a}" for a in angles], angles)).replace(",phi,", ",").replace(",15,", ",")
+    ds = pbrdf.read(table(text), analyzer={"zero": "p"})
+    assert_allclose(stokes_of(ds), STOKES[:, :3], atol=1e-12)
+
+
+def test_remarks_on_the_analyser_stay_attributes(table):
+    header = "# analyzer_maker: Glan & Co\n# title: a wheel"
+    ds = pbrdf.read(table(wide(linear(["I0", "I90"], (0, 90)), header=header)))
+    assert ds.attrs["analyzer_maker"] == "Glan & Co"
+    assert ds.attrs["title"] == "a wheel"
+    path = table("# analyzer_zero: p\n# quantity: dn\ntheta_i,theta_r,I,Q\n1,2,3,1\n")
+    assert_allclose(pbrdf.read(path)["Q"], 1.0)
 
 
 @pytest.mark.slow

@@ -156,11 +156,16 @@ class LongColumns:
         return frozenset({index for index in own if index is not None} | set(self.unused))
 
 
-def holds_readings(names: Sequence[str]) -> bool:
-    """Whether these column names are surely those of readings behind an analyser, and not of Stokes parameters."""
+def holds_readings(names: Sequence[str], *, stated: bool = False) -> bool:
+    """Whether these column names are surely those of readings behind an analyser, and not of Stokes parameters.
+
+    Where the header states how readings were taken, any names are but those of Stokes parameters.
+    """
     keys = {_key(name) for name in names if not split_uncertainty(name)[1]}
     if _STOKES & keys and not _horizontal_and_vertical(names):
         return False
+    if stated:
+        return True
     try:
         wide = wide_columns(names, Settings(), "", sure=True)
         return wide is not None or long_columns(names, {}, "") is not None
@@ -196,7 +201,7 @@ def wide_columns(
         parsed = {index: parse_name(name) for index, name in enumerate(names)}
         found = {index: name for index, name in parsed.items() if name is not None}
         found = _without_lone_letters(found, names)
-        found = _with_hyphens(found)
+        found = _with_hyphens(_without_odd_pairs(found))
     values = {
         index: name
         for index, name in found.items()
@@ -207,8 +212,14 @@ def wide_columns(
         return None
     if not settings.states and _counts(distinct):
         return None
-    if sure and _may_be_directions(values, names):
+    if sure and _may_be_views(values, names):
         return None
+    if not sure and not settings.stated and _may_be_azimuths(values, names):
+        raise DataError(
+            f"{where}: the columns {names[min(values)]!r} … {names[max(values)]!r} may stand for angles of an analyser "
+            "or for azimuths; for an analyser state where its angle 0 lies, '# analyzer_zero: p' (--analyzer zero=p), "
+            "for azimuths give a row for each, with a column phi"
+        )
     indices = [index for index in values if values[index].state.named != DARK]
     states, assumptions = settle([values[index].state for index in indices], where)
     for position, state in enumerate(states):
@@ -414,13 +425,14 @@ def _horizontal_and_vertical(names: Sequence[str]) -> bool:
 def _without_lone_letters(found: dict[int, ReadingName], names: Sequence[str]) -> dict[int, ReadingName]:
     """Without what is bare, unless the whole set speaks for itself: H with V, or the angles of a usual set."""
     bare = {index: name for index, name in found.items() if name.bare}
-    angles = {
-        name.state.polarizer % 180.0
-        for name in bare.values()
-        if name.state.polarizer is not None and name.state.retarder is None
-    }
+    angles = {name.state.polarizer for name in bare.values() if name.state.retarder is None}
     letters = _horizontal_and_vertical(names)
-    usual = angles in ({0.0, 45.0, 90.0, 135.0}, {0.0, 60.0, 120.0}, {0.0, 45.0, 90.0})
+    usual = angles in (
+        {0.0, 45.0, 90.0, 135.0},
+        {0.0, 45.0, 90.0, -45.0},
+        {0.0, 60.0, 120.0},
+        {0.0, 45.0, 90.0},
+    )
     return found if letters or usual else {i: name for i, name in found.items() if i not in bare}
 
 
@@ -449,17 +461,35 @@ def _counts(states: set[State]) -> bool:
     return max(map(abs, angles)) < 10.0 or max(map(abs, angles)) > 360.0 or min(map(abs, angles)) > 90.0
 
 
-def _may_be_directions(values: Mapping[int, ReadingName], names: Sequence[str]) -> bool:
-    """Whether a column for each angle may be one for each viewing angle or azimuth."""
+def _without_odd_pairs(found: dict[int, ReadingName]) -> dict[int, ReadingName]:
+    """Without names of two numbers, unless all are those of the classic set I(0,0), I(45,0), I(90,0), I(45,90)."""
+    pairs = {index: name.state for index, name in found.items() if name.pair}
+    classic = all(
+        state.retardance == 0.0 or (state.retardance == 90.0 and (state.polarizer or 0.0) % 90.0 == 45.0)
+        for state in pairs.values()
+    )
+    return found if classic else {index: name for index, name in found.items() if index not in pairs}
+
+
+def _plain_angles(values: Mapping[int, ReadingName]) -> list[float]:
+    """The angles where all states are those of a polariser; none otherwise."""
     if any(name.state.named or name.state.retarder is not None for name in values.values()):
-        return False
-    angles = {name.state.polarizer or 0.0 for name in values.values()}
-    keys = {_key(name) for name in names}
-    has_azimuth = any("phi" in key or "azim" in key for key in keys)
-    has_view = any(key in _VIEWS for key in keys)
-    turns_on = max(angles) >= 180.0 and not has_azimuth
-    below_horizon = max(map(abs, angles)) < 90.0 and not has_view
-    return turns_on or below_horizon
+        return []
+    return [name.state.polarizer or 0.0 for name in values.values()]
+
+
+def _may_be_views(values: Mapping[int, ReadingName], names: Sequence[str]) -> bool:
+    """Whether a column for each angle may be one for each viewing angle."""
+    angles = _plain_angles(values)
+    has_view = any(_key(name) in _VIEWS for name in names)
+    return bool(angles) and max(map(abs, angles)) < 90.0 and not has_view
+
+
+def _may_be_azimuths(values: Mapping[int, ReadingName], names: Sequence[str]) -> bool:
+    """Whether a column for each angle may be one for each azimuth."""
+    angles = _plain_angles(values)
+    has_azimuth = any("phi" in _key(name) or "azim" in _key(name) for name in names)
+    return bool(angles) and max(angles) - min(angles) >= 180.0 and not has_azimuth
 
 
 _VIEWS = words_of(

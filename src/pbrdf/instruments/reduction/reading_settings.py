@@ -56,6 +56,7 @@ KEYS = (
     "states",
 )
 _KEY = re.compile(r"analy[sz]er_(\w+)", re.IGNORECASE)
+_LINE = re.compile(rf"\s*#\s*analy[sz]er_({'|'.join(KEYS)})\s*:", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -131,8 +132,8 @@ class Settings:
         turned = [state for state in states if state.named is None]
         if turned and not {"zero"} & self.stated and not stokes_stated:
             said.append(
-                "the file does not say where the analyser's angle 0 lies; p was assumed, the plane of the viewing ray "
-                "and the normal, with angles from p towards s (# analyzer_zero: p or s)"
+                "the file does not say where the analyser's angle 0 (H) lies; p was assumed, the plane of the viewing "
+                "ray and the normal, with angles from p towards s (# analyzer_zero: p or s)"
             )
         if any(state.named in ("right", "left") for state in states) and "circular" not in self.stated:
             said.append(
@@ -151,9 +152,10 @@ class Settings:
         return said
 
 
-def is_setting(line: str) -> bool:
-    """Whether a comment line states how readings were taken."""
-    return re.match(r"\s*#\s*analy[sz]er_\w+\s*:", line, re.IGNORECASE) is not None
+def is_setting(line: str, key: str | None = None) -> bool:
+    """Whether a comment line states how readings were taken, or this key of it."""
+    found = _LINE.match(line)
+    return found is not None and key in (None, found[1].lower())
 
 
 def settings_of(
@@ -179,8 +181,10 @@ def settings_of(
     rest: dict[str, Any] = {}
     for key, value in statements.items():
         found = _KEY.fullmatch(key)
-        if found:
-            own[found[1].lower()] = value
+        word = found[1].lower() if found else ""
+        # a slip of the pen is told from a remark, '# analyzer_maker: …', which stays an attribute
+        if word in KEYS or difflib.get_close_matches(word, KEYS, n=1, cutoff=0.75):
+            own[word] = value
         else:
             rest[key] = value
     own |= option or {}

@@ -96,6 +96,8 @@ class ReadingName:
         Whether nothing but a number or a letter stands there, which alone is no sure sign of a reading.
     hyphen
         Whether a hyphen, and nothing else, stands between a word and the number.
+    pair
+        Whether two numbers without words say the state, I(45,90).
     """
 
     state: State
@@ -105,6 +107,7 @@ class ReadingName:
     quantity: str | None = None
     bare: bool = False
     hyphen: bool = False
+    pair: bool = False
 
 
 _UNITS = words_of(
@@ -123,7 +126,7 @@ _PREFIXES = words_of(
 )
 #: With these ``_s`` and ``_p`` mean the light of the source, not the analyser.
 _REFLECTANCES = words_of("r f brdf fr refl reflectance reflectancefactor")
-_FILLERS = words_of("angle axis at state the and fast analysis")
+_FILLERS = words_of("angle axis at state the and fast analysis mean avg average")
 _POLARIZERS = words_of("p pol polar polarizer polariser lp linear analyzer analyser ana an a psa wgp")
 _RETARDERS = {
     **dict.fromkeys(words_of("q qwp qw quarterwave quarterwaveplate"), 90.0),
@@ -134,8 +137,8 @@ _RETARDANCES = words_of("d delta δ retardance")
 _MINUS, _PLUS = words_of("m minus neg n"), words_of("plus pos")
 
 _NAMES = {
-    **dict.fromkeys(words_of("h hor horiz horizontal"), State(polarizer=0.0)),
-    **dict.fromkeys(words_of("v ver vert vertical"), State(polarizer=90.0)),
+    **dict.fromkeys(words_of("h hor horiz horizontal x"), State(polarizer=0.0)),
+    **dict.fromkeys(words_of("v ver vert vertical y"), State(polarizer=90.0)),
     **dict.fromkeys(words_of("d diag diagonal plus"), State(polarizer=45.0)),
     **dict.fromkeys(words_of("a m antidiag antidiagonal anti minus"), State(polarizer=-45.0)),
     **dict.fromkeys(words_of("r right rcp rhc rhcp rc"), State(named="right")),
@@ -211,6 +214,8 @@ def parse_name(name: str) -> ReadingName | None:
     state = _state(tokens)
     if state is None or (prefix in _REFLECTANCES and (state.named or isinstance(tokens[0], str))):
         return None
+    if {"x", "y"} & set(tokens) and prefix not in ("i", "int", "intensity", "signal"):
+        return None  # a component of a vector
     alone = not prefix and len(tokens) == 1
     return ReadingName(
         state,
@@ -221,6 +226,7 @@ def parse_name(name: str) -> ReadingName | None:
         bare=alone
         and (not isinstance(tokens[0], str) or len(tokens[0]) == 1 or state.named in (OPEN, "par", "perp")),
         hyphen=hyphen,
+        pair=sum(not isinstance(token, str) for token in tokens) == 2 == len(tokens),
     )
 
 
@@ -289,7 +295,8 @@ def settle(states: Sequence[State], where: str) -> tuple[list[State], list[str]]
 
 
 def _clean(text: str) -> str:
-    text = text.replace("º", "°").replace("−", "-").replace("–", "-")
+    for sign, plain in (("º", "°"), ("−", "-"), ("–", "-"), ("∥", " par "), ("‖", " par "), ("⊥", " perp ")):
+        text = text.replace(sign, plain)
     return unicodedata.normalize("NFKC", text).strip()
 
 

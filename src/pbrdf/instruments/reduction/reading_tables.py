@@ -233,7 +233,10 @@ def _wide(
     columns = layout.readings
     dark = np.full(len(table), settings.dark or 0.0)
     if layout.dark is not None:
-        dark = dark + np.nan_to_num(table.numbers(layout.dark, _MISSING))
+        column = table.numbers(layout.dark, _MISSING)
+        if np.isnan(column).all():
+            raise DataError(f"{table.path}: the column {table.names[layout.dark]!r} is empty; leave it out")
+        dark = dark + np.where(np.isnan(column), np.nanmean(column), column)
     raw = np.stack([table.numbers(column.index, _MISSING) for column in columns], axis=1)
     value = raw - dark[:, None]
     deviation = None
@@ -313,9 +316,9 @@ def _state_of(
     cells: tuple[str | None, ...],
 ) -> State:
     label, analyzer, retarder, retardance = cells
+    stated = {name.lower(): value for name, value in settings.states.items()}
     state = State()
     if label:
-        stated = {name.lower(): value for name, value in settings.states.items()}
         found = stated.get(label.lower()) or parse_label(label)
         if found is None:
             assert layout.state is not None
@@ -327,7 +330,8 @@ def _state_of(
     if analyzer:
         assert layout.analyzer is not None
         try:
-            state = replace(state, polarizer=_angle(table, row, layout.analyzer, radians))
+            found = stated.get(analyzer.lower())
+            state = found or replace(state, polarizer=_angle(table, row, layout.analyzer, radians))
         except DataError:
             found = parse_label(analyzer)
             if found is None:
@@ -557,9 +561,10 @@ def _clipped(readings: Readings, lines: Sequence[int]) -> list[str]:
 
 def _has_readings(path: Path) -> bool:
     head = first_bytes(path, 2**16).decode("utf-8-sig", errors="replace")
-    if any(is_setting(line) for line in head.splitlines()):
+    stated = [line for line in head.splitlines() if is_setting(line)]
+    if any(is_setting(line, "states") for line in stated):
         return True
-    return holds_readings(column_names(path))
+    return holds_readings(column_names(path), stated=bool(stated))
 
 
 READER = Reader("readings", read_readings, extensions=(".csv", ".tsv", ".txt", ".dat"), sniff=_has_readings)
