@@ -384,6 +384,29 @@ def test_names_of_uncertainties(table, name, factor):
     assert ("coverage factor" in said(ds)) == (factor == 2)
 
 
+@pytest.mark.parametrize(
+    ("columns", "unit"),
+    [
+        ("reading,reading_std", ""),
+        ("V (mV),u(V)", ""),
+        ("signal,err (mV)", ""),
+        ("power,std (%)", "%"),
+        ("I,I_err", ""),
+    ],
+)
+def test_names_of_uncertainties_of_a_long_table(table, columns, unit):
+    rows = [
+        f"40,{view},15,{a},{reading(s, a)!r},{100 * 0.01 / reading(s, a) if unit else 0.01!r}"
+        for s, view in zip(STOKES, VIEWS, strict=True)
+        for a in (0, 45, 90, 135)
+    ]
+    ds = pbrdf.read(table(f"theta_i,theta_r,phi,analyzer,{columns}\n" + "\n".join(rows) + "\n"))
+    assert_allclose(stokes_of(ds), STOKES[:, :3], atol=1e-12)
+    if not unit:
+        assert_allclose(ds["I_std"], 0.01, rtol=1e-9)
+    assert_allclose(ds["Q_std"], 0.01 * np.sqrt(2.0), rtol=1e-9)
+
+
 def test_uncertainties_in_percent(table):
     names = ("I0", "I90")
     ds = pbrdf.read(table(wide(linear(names, (0, 90)) | {f"{n}_std (%)": 2.0 for n in names})))
@@ -602,6 +625,8 @@ def test_polarisation_that_was_computed_beside_the_readings_is_not_used(table):
             "no column 'b'",
         ),
         ("theta_i,theta_r,I0,I90,I180,I270\n1,2,3,4,5,6\n", {}, "analyser or for azimuths"),
+        ("theta_i,theta_r,I0,I90\n1,2,3,4\n1,2,inf,4\n", {}, "line 3, column 'I0': a reading is infinite"),
+        ("theta_i,theta_r,I0,I90\n1,2,1e308,1e308\n", {}, "infinite|finite"),
         ("theta_i,theta_r,I0,I90,dark\n1,2,3,4,\n", {}, "column 'dark' is empty"),
         ("# analyzer_zer: s\ntheta_i,theta_r,I0,I90\n1,2,3,4\n", {}, "did you mean 'zero'"),
         ("theta_i,theta_r,brdf\n1,2,3\n", {"format": "readings"}, "no readings behind an analyser"),

@@ -221,6 +221,8 @@ def wide_columns(
             "for azimuths give a row for each, with a column phi"
         )
     indices = [index for index in values if values[index].state.named != DARK]
+    if not indices:
+        return None
     states, assumptions = settle([values[index].state for index in indices], where)
     for position, state in enumerate(states):
         if state in states[:position]:
@@ -323,12 +325,12 @@ def long_columns(names: Sequence[str], mapping: Mapping[str, str], where: str) -
     deviation, divisor, percent = position("reading_std", frozenset()), 1.0, False
     for index, name in enumerate(names):
         rest, is_deviation, coverage = split_uncertainty(name)
-        own = _key(rest)
+        own = _key(rest).replace("voltage", "v")
         if index == deviation or (
             deviation is None
             and is_deviation
             and index not in used
-            and own in ("", keys[reading], *_READINGS)
+            and own in ("", "v", keys[reading], *_READINGS)
         ):
             deviation, divisor, percent = index, coverage or 1.0, "%" in name
         elif deviation is None and own in _LONE_DEVIATIONS:
@@ -364,7 +366,9 @@ def source_columns(names: Sequence[str]) -> list[int]:
 
 
 def _key(name: str) -> str:
-    """The words of a name without units, in one."""
+    """The words of a name without units, in one; a V in volts is no Stokes V but a voltage."""
+    if re.fullmatch(r"v[\s_]*[\[(]?[mµuμ]?v[\])]?", name.strip().lower()):
+        return "voltage"
     text = re.sub(r"[\[(].*?[\])]", " ", name.lower())
     words = _WORD.findall(text)
     while len(words) > 1 and words[-1] in _UNIT_WORDS | {

@@ -161,7 +161,7 @@ _QUANTITIES = {
 
 _DEVIATION = "standarduncertainty|uncertainty|unc|stdev|stddev|stderr|std|sd|sem|se|sigma|σ|error|err"
 _WRAPPED = re.compile(rf"({_DEVIATION}|u|δ|delta)\s*[(\[](.+)[)\]]", re.IGNORECASE)
-_BEFORE = re.compile(rf"({_DEVIATION}|u)[\s_.]+(.+)", re.IGNORECASE)
+_BEFORE = re.compile(rf"({_DEVIATION}|u|δ|delta)[\s_.]+(.+)|(d|δ)([IL][\s_.(\[]*[-+]?\d.*)", re.IGNORECASE)
 _AFTER = re.compile(rf"(.*?)[\s_.]+({_DEVIATION}|u)|(.*?)({_DEVIATION})", re.IGNORECASE)
 _COVERAGE = re.compile(r"[(\[,;]?\s*\bk\s*=\s*(\d+(?:\.\d+)?)\s*[)\]]?", re.IGNORECASE)
 _BRACKETS = re.compile(r"[(\[{]([^()\[\]{}]*)[)\]}]")
@@ -178,8 +178,12 @@ def split_uncertainty(name: str) -> tuple[str, bool, float | None]:
     if stated := _COVERAGE.search(text):
         coverage = float(stated[1])
         text = (text[: stated.start()] + text[stated.end() :]).strip(" _-")
-    if found := _WRAPPED.fullmatch(text) or _BEFORE.fullmatch(text):
-        sign, rest = found[1], found[2]
+    wrapped = _WRAPPED.fullmatch(text)
+    # std (mV) has a unit in its brackets; u(V) is the uncertainty of V, but U (V) is U in volts
+    if wrapped and (wrapped[2].strip().lower() not in _UNITS or (wrapped[1], wrapped[2]) == ("u", "V")):
+        sign, rest = wrapped[1], wrapped[2]
+    elif found := _BEFORE.fullmatch(text):
+        sign, rest = (found[1], found[2]) if found[1] else (found[3], found[4])
     elif found := _AFTER.fullmatch(_without_unit(text)[0]):
         rest, sign = (found[1], found[2]) if found[2] else (found[3], found[4])
         unit = _without_unit(text)[1]

@@ -188,7 +188,7 @@ def read_readings(
         0.01 if layout.unit == "%" and stated_quantity == "reflectance_factor" else 1.0
     )
     vector, covariance = found.stokes * scale[:, None], found.covariance * scale[:, None, None] ** 2
-    usable = np.isfinite(vector[:, 0])
+    usable = ~np.isnan(vector[:, 0])
     assumptions += _incomplete(vector, usable, first_lines, names, path)
     assumptions += disagreements(found, first_lines, _sums(readings, names, len(first)))
     assumptions += _clipped(readings, first_lines)
@@ -209,10 +209,10 @@ def read_readings(
             name: geometries[name].values if name in geometries.coords else None
             for name in ("theta_i", "theta_r", "phi", "wavelength", "group")
         },
-        {name: vector[usable, k] for k, name in enumerate(STOKES) if np.isfinite(vector[usable, k]).any()},
+        {name: vector[usable, k] for k, name in enumerate(STOKES) if not np.isnan(vector[usable, k]).all()},
         {},
         attrs,
-        covariance[usable] if np.isfinite(covariance[usable]).any() else None,
+        covariance[usable] if not np.isnan(covariance[usable]).all() else None,
     )
     validate(
         result, origin=str(path), lines=[line for line, use in zip(first_lines, usable, strict=True) if use]
@@ -233,11 +233,11 @@ def _wide(
     columns = layout.readings
     dark = np.full(len(table), settings.dark or 0.0)
     if layout.dark is not None:
-        column = table.numbers(layout.dark, _MISSING)
+        column = _numbers(table, layout.dark)
         if np.isnan(column).all():
             raise DataError(f"{table.path}: the column {table.names[layout.dark]!r} is empty; leave it out")
         dark = dark + np.where(np.isnan(column), np.nanmean(column), column)
-    raw = np.stack([table.numbers(column.index, _MISSING) for column in columns], axis=1)
+    raw = np.stack([_numbers(table, column.index) for column in columns], axis=1)
     value = raw - dark[:, None]
     deviation = None
     if any(column.deviation is not None for column in columns):
@@ -270,7 +270,7 @@ def _long(
     place = {state: index for index, state in enumerate(states)}
     darks = np.array([state.named == DARK for state in of_row])
     number = np.array([place.get(meaning[state], 0) for state in of_row], dtype=np.intp)
-    raw = table.numbers(layout.reading, _MISSING)
+    raw = _numbers(table, layout.reading)
     dark = np.full(len(table), settings.dark or 0.0)
     if darks.any():
         dark += _dark_readings(table, layout, raw, darks)
@@ -278,6 +278,17 @@ def _long(
     if layout.deviation is not None:
         deviation = _deviations(table, layout.deviation, layout.divisor, layout.relative, raw)[:, None]
     return number[:, None], (raw - dark)[:, None], deviation, states, dark, darks
+
+
+def _numbers(table: Table, index: int) -> NDArray[np.float64]:
+    """Readings of a column, NaN where there is none."""
+    found = table.numbers(index, _MISSING)
+    infinite = np.flatnonzero(np.isinf(found))
+    if infinite.size:
+        raise DataError(
+            f"{table.place(int(infinite[0]), index)}: a reading is infinite; leave the cell empty if there is none"
+        )
+    return found
 
 
 def _deviations(
@@ -432,7 +443,8 @@ def _require_one_sample(
             continue
         cells = [table.rows[row][index] for row in kept]
         words = "".join(letter for letter in name.lower() if letter.isalpha())
-        if not any(word in words for word in _SAMPLES) and all(_is_number(cell) for cell in cells):
+        labels = len(set(cells)) <= len(cells) // 2 and not all(_is_number(cell) for cell in cells)
+        if not (labels or any(word in words for word in _SAMPLES)):
             continue
         seen: dict[tuple[int, bytes], str] = {}
         for row, g, cell in zip(kept.tolist(), geometry.tolist(), cells, strict=True):
@@ -508,7 +520,7 @@ def _incomplete(
             f"{rows.size} of {usable.size} geometries were left out, because their readings do not determine the "
             f"intensity (line{'s' if rows.size > 1 else ''} {shown})"
         )
-    known = np.isfinite(vector[usable])
+    known = ~np.isnan(vector[usable])
     never = [name for k, name in enumerate(STOKES[:3]) if not known[:, k].any()]
     if never:
         sentences.append(f"the states {', '.join(names)} do not determine {' and '.join(never)}")
