@@ -94,11 +94,6 @@ def solve_readings(readings: Readings, geometries: int) -> Solution:
     geometries
         Number G of geometries.
     """
-    with np.errstate(over="ignore", invalid="ignore"):  # what is infinite then is refused with the data set
-        return _solved_with_noise(readings, geometries)
-
-
-def _solved_with_noise(readings: Readings, geometries: int) -> Solution:
     good = np.isfinite(readings.value)
     geometry, state, value = readings.geometry[good], readings.state[good], readings.value[good]
     stated = None if readings.deviation is None else readings.deviation[good]
@@ -164,7 +159,7 @@ def _solved(
                 continue
             full = _shortest(y[:, which], spread[:, which], W, weighted)
             residual = y[:, which] - W @ full
-            with np.errstate(divide="ignore"):
+            with np.errstate(divide="ignore", invalid="ignore"):
                 miss[own] = np.sqrt((residual**2).sum(axis=0) / left) / np.abs(full[0])
             if weighted:
                 chi2[own] = (residual**2 / spread[:, which]).sum(axis=0)

@@ -54,6 +54,8 @@ _MISSING = frozenset(("", "nan", "na"))
 _OWN = ("reading", "reading_std", "analyzer", "retarder", "retardance", "state")
 #: Directions that differ by less than this are one geometry, radians and nm.
 _SAME = 7
+#: Readings whose squares are numbers.
+_LARGEST = 1e150
 _SAMPLES = ("sample", "specimen", "material", "coupon", "panel", "paint", "target")
 
 
@@ -281,12 +283,14 @@ def _long(
 
 
 def _numbers(table: Table, index: int) -> NDArray[np.float64]:
-    """Readings of a column, NaN where there is none."""
-    found = table.numbers(index, _MISSING)
-    infinite = np.flatnonzero(np.isinf(found))
-    if infinite.size:
+    """Readings of a column, or their uncertainties, NaN where there is none."""
+    found = np.asarray(table.numbers(index, _MISSING))
+    beyond = np.flatnonzero(np.abs(found) > _LARGEST)
+    if beyond.size:
+        row = int(beyond[0])
         raise DataError(
-            f"{table.place(int(infinite[0]), index)}: a reading is infinite; leave the cell empty if there is none"
+            f"{table.place(row, index)}: {table.rows[row][index]!r} is no reading: infinite, or as good as that; leave "
+            "the cell empty where there is none"
         )
     return found
 
@@ -294,8 +298,8 @@ def _numbers(table: Table, index: int) -> NDArray[np.float64]:
 def _deviations(
     table: Table, index: int, divisor: float, relative: bool, raw: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    found = np.asarray(table.numbers(index, _MISSING)) / divisor
-    found = found * np.abs(raw) / 100.0 if relative else found
+    found = _numbers(table, index) / divisor
+    found = found / 100.0 * np.abs(raw) if relative else found
     bad = np.flatnonzero(found < 0.0)
     if bad.size:
         raise DataError(f"{table.place(int(bad[0]), index)}: an uncertainty is negative")
