@@ -198,8 +198,9 @@ def read_readings(
         **ds.attrs,
         "readings": [f"{name}: {_in_words(s, settings)}" for name, s in zip(names, states, strict=True)],
     }
-    if layout.unused:
-        ignored = [*attrs.get("ignored_columns", ()), *(table.names[i] for i in layout.unused)]
+    attrs.pop("ignored_columns", None)
+    ignored = [name for name in ds.attrs.get("ignored_columns", ()) if name]
+    if ignored := ignored + [table.names[i] for i in layout.unused]:
         attrs["ignored_columns"] = ignored
     if stated_quantity is None or layout.unit not in ("", "1", "-", "%", "1/sr", "sr^-1", "sr-1", "/sr"):
         attrs.setdefault("scale", "arbitrary")
@@ -396,14 +397,9 @@ def _dark_readings(
 
 
 def _without(table: Table, used: frozenset[int]) -> Table:
-    """The table without these columns."""
-    keep = [index for index in range(len(table.names)) if index not in used]
-    return replace(
-        table,
-        names=[table.names[index] for index in keep],
-        rows=[[row[index] for index in keep] for row in table.rows],
-        units=None if table.units is None else [table.units[index] for index in keep],
-    )
+    """The table whose columns of readings have no names, and so no meaning; they stay where they are."""
+    names = ["" if index in used else name for index, name in enumerate(table.names)]
+    return replace(table, names=names)
 
 
 def _geometries(ds: xr.Dataset) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -442,10 +438,11 @@ def _require_one_sample(
     path: Path,
 ) -> None:
     """Readings of one state at one geometry must not be those of two samples."""
+    rows = table.rows
     for index, name in enumerate(table.names):
         if name not in others:
             continue
-        cells = [table.rows[row][index] for row in kept]
+        cells = [rows[row][index] for row in kept]
         words = "".join(letter for letter in name.lower() if letter.isalpha())
         labels = len(set(cells)) <= len(cells) // 2 and not all(_is_number(cell) for cell in cells)
         if not (labels or any(word in words for word in _SAMPLES)):
