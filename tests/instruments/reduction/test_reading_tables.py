@@ -7,6 +7,8 @@ positive for light that turns from p towards s, anticlockwise for the receiver w
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -14,6 +16,7 @@ from numpy.testing import assert_allclose
 import pbrdf
 from pbrdf.data.paints import load_paint, open_experiment
 from pbrdf.errors import DataError
+from pbrdf.instruments.reduction import reading_tables
 from pbrdf.instruments.reduction.reading_columns import holds_readings
 
 RNG = np.random.default_rng(7)
@@ -334,11 +337,31 @@ def test_units_of_the_analysers_angle(table, unit, factor):
     assert_allclose(stokes_of(ds), STOKES[:, :3], atol=1e-7)
 
 
+def test_a_row_of_units(table, monkeypatch):
+    """Units that a row under the names says, as files.delimited gives them."""
+    units = ["deg", "deg", "deg", "rad", "%", "%"]
+    read_table = reading_tables.read_table
+    monkeypatch.setattr(reading_tables, "read_table", lambda path: replace(read_table(path), units=units))
+    rows = [
+        f"40,{view},15,{float(np.deg2rad(a))!r},{100 * reading(s, a)!r},{1.0}"
+        for s, view in zip(STOKES, VIEWS, strict=True)
+        for a in (0, 50, 100)
+    ]
+    path = table("theta_i,theta_r,phi,analyzer,reading,reading_std\n" + "\n".join(rows) + "\n")
+    ds = pbrdf.read(path, quantity="reflectance_factor")
+    assert_allclose(stokes_of(ds), STOKES[:, :3], atol=1e-7)
+    assert ds["I_std"].values.min() > 0.005
+
+
 def test_columns_of_a_long_table_by_name(table):
     text = long_table("wheel,plate,wave,out")
     mapping = {"analyzer": "wheel", "retarder": "plate", "retardance": "wave", "reading": "out"}
     ds = pbrdf.read(table(text), format="readings", column=mapping)
     assert_allclose(stokes_of(ds, "IQUV"), STOKES, atol=1e-12)
+    with pytest.raises(
+        DataError, match="there is no column 'whel' for analyzer; the columns are theta_i, theta_r"
+    ):
+        pbrdf.read(table(text), format="readings", column={"analyzer": "whel"})
 
 
 # --- uncertainties ---------------------------------------------------------------------------------------

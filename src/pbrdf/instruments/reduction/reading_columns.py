@@ -283,16 +283,12 @@ def long_columns(names: Sequence[str], mapping: Mapping[str, str], where: str) -
     Raises
     ------
     DataError
-        If a name of the mapping is not one of the file, or two columns may hold the readings.
+        If two columns may hold the readings.
     """
     keys = [_key(name) for name in names]
 
     def position(name: str, known: frozenset[str] | Mapping[str, object]) -> int | None:
         if name in mapping:
-            if mapping[name] not in names:
-                raise DataError(
-                    f"{where}: there is no column {mapping[name]!r} for {name}; the columns are {', '.join(names)}"
-                )
             return list(names).index(mapping[name])
         return next((index for index, key in enumerate(keys) if key in known), None)
 

@@ -116,16 +116,10 @@ def read_readings(
         if own in mapping and here not in mapping:
             mapping[here] = mapping.pop(own)
     own_mapping = {name: mapping.pop(name) for name in _OWN if name in mapping}
-    layout: WideColumns | LongColumns | None = None
-    if not own_mapping:
-        layout = wide_columns(table.names, settings, str(path))
-    layout = layout or long_columns(table.names, own_mapping, str(path))
-    if layout is None:
-        raise DataError(
-            f"{path}: there are no readings behind an analyser: name the columns I0, I45, I90, I135, or give a column "
-            "'analyzer' and one 'reading', or state them in a line '# analyzer_states: NAME = polarizer 45; …'; the "
-            f"columns are {', '.join(table.names)}"
-        )
+    plain, table = table, _with_units(table)
+    layout = _layout(
+        table, settings, {name: table.names[_position(plain, name, own_mapping)] for name in own_mapping}
+    )
     _require_one_source(table)
     if isinstance(layout, WideColumns):
         state, value, deviation, states, dark = _wide(table, layout, settings)
@@ -136,7 +130,7 @@ def read_readings(
     rows = np.flatnonzero(~darks)
     implied = layout.quantity or ("brdf" if layout.unit in ("1/sr", "sr^-1", "sr-1", "/sr") else None)
     stated_quantity = quantity or stated.get("quantity") or implied
-    rest = _without(table.taken(rows.tolist()), layout.used)
+    rest = _without(plain.taken(rows.tolist()), layout.used)
     ds, lines = read_rows(
         rest,
         column={**mapping, "I": "=1"},
@@ -223,6 +217,41 @@ def read_readings(
     return result
 
 
+def _with_units(table: Table) -> Table:
+    """The table with the units of its row of units in the names of the columns."""
+    if table.units is None:
+        return table
+    names = [
+        name if not unit or re.search(r"[(\[]", name) else f"{name} [{unit}]"
+        for name, unit in zip(table.names, table.units, strict=True)
+    ]
+    return replace(table, names=names)
+
+
+def _position(table: Table, name: str, mapping: Mapping[str, str]) -> int:
+    if mapping[name] not in table.names:
+        raise DataError(
+            f"{table.path}: there is no column {mapping[name]!r} for {name}; the columns are {', '.join(table.names)}"
+        )
+    return table.names.index(mapping[name])
+
+
+def _layout(table: Table, settings: Settings, mapping: Mapping[str, str]) -> WideColumns | LongColumns:
+    """Which columns hold the readings; raises DataError if none does."""
+    where = str(table.path)
+    layout: WideColumns | LongColumns | None = None
+    if not mapping:
+        layout = wide_columns(table.names, settings, where)
+    layout = layout or long_columns(table.names, mapping, where)
+    if layout is None:
+        raise DataError(
+            f"{where}: there are no readings behind an analyser: name the columns I0, I45, I90, I135, or give a column "
+            "'analyzer' and one 'reading', or state them in a line '# analyzer_states: NAME = polarizer 45; …'; the "
+            f"columns are {', '.join(table.names)}"
+        )
+    return layout
+
+
 def _wide(
     table: Table, layout: WideColumns, settings: Settings
 ) -> tuple[
@@ -236,10 +265,10 @@ def _wide(
     columns = layout.readings
     dark = np.full(len(table), settings.dark or 0.0)
     if layout.dark is not None:
-        column = _numbers(table, layout.dark)
-        if np.isnan(column).all():
+        read = _numbers(table, layout.dark)
+        if np.isnan(read).all():
             raise DataError(f"{table.path}: the column {table.names[layout.dark]!r} is empty; leave it out")
-        dark = dark + np.where(np.isnan(column), np.nanmean(column), column)
+        dark = dark + np.where(np.isnan(read), np.nanmean(read), read)
     raw = np.stack([_numbers(table, column.index) for column in columns], axis=1)
     value = raw - dark[:, None]
     deviation = None
@@ -399,7 +428,8 @@ def _dark_readings(
 def _without(table: Table, used: frozenset[int]) -> Table:
     """The table whose columns of readings have no names, and so no meaning; they stay where they are."""
     names = ["" if index in used else name for index, name in enumerate(table.names)]
-    return replace(table, names=names)
+    units = None if table.units is None else ["" if i in used else unit for i, unit in enumerate(table.units)]
+    return replace(table, names=names, units=units)
 
 
 def _geometries(ds: xr.Dataset) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
