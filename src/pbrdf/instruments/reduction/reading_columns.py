@@ -53,8 +53,8 @@ _READINGS = {
     "dn": "dn",
 }
 #: Polarisation that somebody has computed already.
-_COMPUTED = words_of("q u v s1 s2 s3 qi ui vi dolp aolp dop aop docp")
-_STOKES = _COMPUTED - words_of("dolp aolp dop aop docp")
+_STOKES = words_of("q u v s1 s2 s3 qi ui vi qoveri uoveri voveri s1s0 s2s0 s3s0")
+_COMPUTED = _STOKES | words_of("dolp aolp dop aop docp dolppercent")
 _SOURCE = words_of(
     "psg psgangle generator sourcepolarizer sourcepolariser sourcepolarization "
     "incidentpolarization illuminationpolarization illumination inputpolarization"
