@@ -271,6 +271,23 @@ def test_light_of_the_source_in_the_files_axes(table):
     assert ds.attrs["illumination"] == [1.0, -1.0, 0.0, 0.0]
 
 
+@pytest.mark.parametrize(
+    ("label", "light", "words"),
+    [
+        ("s", [1, -1, 0, 0], ""),
+        ("p", [1, 1, 0, 0], ""),
+        ("none", [1, 0, 0, 0], ""),
+        ("45", [1, 0, 0, 0], "says '45' of the source, but natural light was assumed"),
+    ],
+)
+def test_a_column_tells_the_light_of_the_source(table, label, light, words):
+    text = wide(linear(["I0", "I45", "I90"], (0, 45, 90)), extra=(",psg", f",{label}"))
+    ds = pbrdf.read(table(text))
+    assert ds.attrs["illumination"] == light
+    assert (words in said(ds)) if words else "of the source" not in said(ds)
+    assert pbrdf.read(table(text), illumination="1,0,1,0").attrs["illumination"] == [1, 0, 1, 0]
+
+
 # --- long tables -----------------------------------------------------------------------------------------
 
 LONG = [(p, r) for p in (0.0, 45.0) for r in (None, 0.0, 30.0, 75.0)]

@@ -120,7 +120,7 @@ def read_readings(
     layout = _layout(
         table, settings, {name: table.names[_position(plain, name, own_mapping)] for name in own_mapping}
     )
-    _require_one_source(table)
+    light = _light(table) if illumination is None and "illumination" not in stated else None
     if isinstance(layout, WideColumns):
         state, value, deviation, states, dark = _wide(table, layout, settings)
         darks: NDArray[np.bool_] = np.zeros(len(table), dtype=bool)
@@ -167,6 +167,7 @@ def read_readings(
         *ds.attrs.get("assumptions", ()),
         *settings.assumptions(states, "stokes" in stated),
         *layout.assumptions,
+        *([light] if isinstance(light, str) else []),
     ]
     if stated_quantity is None:
         assumptions.append(
@@ -192,6 +193,8 @@ def read_readings(
         **ds.attrs,
         "readings": [f"{name}: {_in_words(s, settings)}" for name, s in zip(names, states, strict=True)],
     }
+    if isinstance(light, list):
+        attrs["illumination"] = light
     attrs.pop("ignored_columns", None)
     ignored = [name for name in ds.attrs.get("ignored_columns", ()) if name]
     if ignored := ignored + [table.names[i] for i in layout.unused]:
@@ -448,15 +451,31 @@ def _geometries(ds: xr.Dataset) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     return rank[place.ravel()], first[order]
 
 
-def _require_one_source(table: Table) -> None:
+def _light(table: Table) -> list[float] | str | None:
+    """What a column says of the source: its Stokes vector (p, s), a sentence if that is not clear, None without one.
+
+    Raises DataError if there are several.
+    """
+    found: list[float] | str | None = None
     for index in source_columns(table.names):
+        name = table.names[index]
         labels = sorted({row[index] for row in table.rows})
         if len(labels) > 1:
             raise DataError(
-                f"{table.path}: the column {table.names[index]!r} says that the source was polarised in several ways "
-                f"({', '.join(labels[:6])}); take one of them with --where {table.names[index]}={labels[0]} "
-                f"(where={{{table.names[index]!r}: {labels[0]!r}}}) and state the light with the option illumination"
+                f"{table.path}: the column {name!r} says that the source was polarised in several ways "
+                f"({', '.join(labels[:6])}); take one of them with --where {name}={labels[0]} "
+                f"(where={{{name!r}: {labels[0]!r}}}) and state the light with the option illumination"
             )
+        state = parse_label(labels[0])
+        named = None if state is None else {"P": "p"}.get(state.named or "", state.named)
+        if named in ("p", "s"):
+            found = [1.0, 1.0 if named == "p" else -1.0, 0.0, 0.0]
+        elif named != OPEN and labels[0].lower() not in ("", "natural", "unpolarized", "unpolarised"):
+            found = (
+                f"the column {name!r} says {labels[0]!r} of the source, but natural light was assumed; state its "
+                "Stokes vector with the option illumination"
+            )
+    return found
 
 
 def _require_one_sample(
