@@ -127,6 +127,9 @@ def said(ds):
         "I135 I90 I45 I180",
         "I_0deg_mean I_45deg_mean I_90deg_mean I_135deg_mean",
         "I_x I_45 I_y I_135",
+        "signal@0 signal@45 signal@90 signal@135",
+        "I_000 I_045 I_090 I_135",
+        "Intensity_(0_deg)_[a.u.] Intensity_(45_deg)_[a.u.] Intensity_(90_deg)_[a.u.] Intensity_(135_deg)_[a.u.]",
         "I∥ I45 I⊥ I135",
     ],
 )
@@ -286,6 +289,26 @@ def test_a_column_tells_the_light_of_the_source(table, label, light, words):
     assert ds.attrs["illumination"] == light
     assert (words in said(ds)) if words else "of the source" not in said(ds)
     assert pbrdf.read(table(text), illumination="1,0,1,0").attrs["illumination"] == [1, 0, 1, 0]
+
+
+def test_readings_of_unequal_exposures(table):
+    """Long: each reading by its exposure, in units of the first; shot noise counts the electrons that were there."""
+    lines = ["# analyzer_gain: 2", "theta_i,theta_r,phi,analyzer,exposure_ms,counts"]
+    times = {0: 10.0, 45: 20.0, 90: 40.0}
+    for s, view in zip(1000.0 * STOKES, VIEWS, strict=True):
+        lines += [f"40,{view},15,{a},{t},{reading(s, a) * t / 10.0!r}" for a, t in times.items()]
+    ds = pbrdf.read(table("\n".join(lines) + "\n"))
+    assert_allclose(stokes_of(ds), 1000.0 * STOKES[:, :3], rtol=1e-12)
+    assert "divided by the column 'exposure_ms'" in said(ds)
+    assert "ignored_columns" not in ds.attrs
+    # I = I0 + I90, each with the variance y/(2 t)
+    variance = [reading(s, 0) / 2 + reading(s, 90) / 8 for s in 1000.0 * STOKES]
+    assert_allclose(ds["I_std"], np.sqrt(variance), rtol=1e-9)
+
+
+def test_a_monitor_that_is_not_used_is_said(table):
+    ds = pbrdf.read(table(wide(linear(["I0", "I90"], (0, 90)) | {"monitor": 1.0})))
+    assert "the column 'monitor' was not used" in said(ds)
 
 
 # --- long tables -----------------------------------------------------------------------------------------
@@ -667,6 +690,11 @@ def test_polarisation_that_was_computed_beside_the_readings_is_not_used(table):
         ("theta_i,theta_r,I0,I90,I180,I270\n1,2,3,4,5,6\n", {}, "analyser or for azimuths"),
         ("theta_i,theta_r,I0,I90\n1,2,3,4\n1,2,inf,4\n", {}, "line 3, column 'I0': 'inf' is no reading"),
         ("theta_i,theta_r,I0,I90\n1,2,1e308,1e308\n", {}, "line 2, column 'I0': '1e308' is no reading"),
+        (
+            "theta_i,theta_r,exposure,I0,I90\n1,2,0,3,4\n",
+            {},
+            "column 'exposure': an exposure is a number above 0",
+        ),
         ("theta_i,theta_r,I0,I90,dark\n1,2,3,4,\n", {}, "column 'dark' is empty"),
         ("# analyzer_zer: s\ntheta_i,theta_r,I0,I90\n1,2,3,4\n", {}, "did you mean 'zero'"),
         ("theta_i,theta_r,brdf\n1,2,3\n", {"format": "readings"}, "no readings behind an analyser"),

@@ -25,7 +25,17 @@ from pbrdf.instruments.reduction.reading_states import (
     words_of,
 )
 
-__all__ = ["LongColumns", "ReadingColumn", "WideColumns", "holds_readings", "long_columns", "wide_columns"]
+__all__ = [
+    "LongColumns",
+    "ReadingColumn",
+    "WideColumns",
+    "exposure_column",
+    "holds_readings",
+    "long_columns",
+    "source_columns",
+    "unused_factors",
+    "wide_columns",
+]
 
 _WORD = re.compile(r"[^\W\d_]+|\d+(?:\.\d+)?", re.UNICODE)
 _UNIT_WORDS = words_of("deg degree degrees rad radian radians angle")
@@ -37,8 +47,10 @@ _RETARDERS = {
     **dict.fromkeys(("hwp", "halfwaveplate"), 180.0),
     **dict.fromkeys(("retarder", "waveplate", "compensator")),
 }
-_STATES = frozenset(
-    ("state", "analyzerstate", "analyserstate", "polarizerstate", "polariserstate", "psastate")
+_STATES = words_of(
+    "state analyzerstate analyserstate polarizerstate polariserstate psastate polstate polarizationstate "
+    "polarisationstate detectorpolarization detectorpolarisation detectionpolarization detectionpolarisation "
+    "receiverpolarization receiverpolarisation outputpolarization outputpolarisation"
 )
 _READINGS = {
     **dict.fromkeys(
@@ -359,6 +371,30 @@ def source_columns(names: Sequence[str]) -> list[int]:
     keys = [_key(name) for name in names]
     beside = bool(_ANALYZERS & set(keys))
     return [i for i, key in enumerate(keys) if key in _SOURCE or (beside and key in _POLARIZERS)]
+
+
+def exposure_column(names: Sequence[str]) -> int | None:
+    """Position of the column of exposure times, by which readings are divided; None without one."""
+    return next((i for i, name in enumerate(names) if _without_time(_key(name)) in _EXPOSURES), None)
+
+
+def unused_factors(names: Sequence[str]) -> list[str]:
+    """Columns that seem to say by what the readings should be divided, and that nothing here uses."""
+    return [name for name in names if _key(name) in _FACTORS]
+
+
+_EXPOSURES = words_of("exposure exposuretime integrationtime shutter exptime")
+_FACTORS = words_of(
+    "monitor reference ref iref referencesignal monitorsignal refsignal sensitivity gain attenuation filter nd od "
+    "lamp laserpower sourcepower"
+)
+
+
+def _without_time(key: str) -> str:
+    for unit in ("seconds", "ms", "us", "s"):
+        if key.endswith(unit) and key.removesuffix(unit) in _EXPOSURES:
+            return key.removesuffix(unit)
+    return key
 
 
 def _key(name: str) -> str:

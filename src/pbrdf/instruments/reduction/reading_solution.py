@@ -44,7 +44,7 @@ class Readings:
     vectors
         Analyser vectors of the states, shape (states, 4).
     gain
-        Electrons per unit of the readings, None where shot noise is not to count.
+        Electrons per unit of each reading, shape (N,); None where shot noise is not to count.
     dark
         Dark signal that was taken from the readings, whose shot noise is still in them.
     """
@@ -54,7 +54,7 @@ class Readings:
     value: NDArray[np.float64]
     deviation: NDArray[np.float64] | None
     vectors: NDArray[np.float64]
-    gain: float | None = None
+    gain: NDArray[np.float64] | None = None
     dark: float = 0.0
 
 
@@ -106,7 +106,8 @@ def solve_readings(readings: Readings, geometries: int) -> Solution:
         noise = "stated"
     elif readings.gain is not None:
         # At least one electron: a reading near 0 is not known without error.
-        variance = np.maximum((expected + readings.dark) / readings.gain, readings.gain**-2)
+        gain = readings.gain[good][order]
+        variance = np.maximum((expected + readings.dark) / gain, gain**-2)
         noise = "shot"
     else:
         variance = _scatter(geometry, state, value, plain.stokes[:, 0], geometries)

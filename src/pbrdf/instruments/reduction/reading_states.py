@@ -340,7 +340,7 @@ def _tokens(text: str) -> tuple[list[str | float], bool]:
         elif word.lower() not in _ANGLE_UNITS:
             found.append(word.lower())
     # What stands there besides (a slash, an asterisk) is no name of a state.
-    return ([] if re.search(r"[^\s_.,;:=+()\[\]-]", rest) else found), hyphen
+    return ([] if re.search(r"[^\s_.,;:=+@()\[\]-]", rest) else found), hyphen
 
 
 def _state(tokens: Iterable[str | float]) -> State | None:

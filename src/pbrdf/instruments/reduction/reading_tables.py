@@ -37,9 +37,11 @@ from pbrdf.files.text import first_bytes
 from pbrdf.instruments.reduction.reading_columns import (
     LongColumns,
     WideColumns,
+    exposure_column,
     holds_readings,
     long_columns,
     source_columns,
+    unused_factors,
     wide_columns,
 )
 from pbrdf.instruments.reduction.reading_settings import Settings, is_setting, settings_of
@@ -127,10 +129,15 @@ def read_readings(
     else:
         radians = str(angles or stated.get("angles", "")).lower() == "radians"
         state, value, deviation, states, dark, darks = _long(table, layout, settings, radians)
+    exposure = _exposures(table)
+    value, dark = value / exposure[:, None], dark / exposure
+    deviation = None if deviation is None else deviation / exposure[:, None]
     rows = np.flatnonzero(~darks)
     implied = layout.quantity or ("brdf" if layout.unit in ("1/sr", "sr^-1", "sr-1", "/sr") else None)
     stated_quantity = quantity or stated.get("quantity") or implied
-    rest = _without(plain.taken(rows.tolist()), layout.used)
+    time = exposure_column(table.names)
+    used = layout.used | (frozenset() if time is None else {time})
+    rest = _without(plain.taken(rows.tolist()), used)
     ds, lines = read_rows(
         rest,
         column={**mapping, "I": "=1"},
@@ -157,7 +164,7 @@ def read_readings(
         values.ravel(),
         None if spreads is None else spreads.ravel(),
         vectors,
-        settings.gain,
+        None if settings.gain is None else np.repeat(settings.gain * exposure[kept], count),
         float(np.mean(dark)),
     )
     found = solve_readings(readings, len(first))
@@ -168,6 +175,15 @@ def read_readings(
         *settings.assumptions(states, "stokes" in stated),
         *layout.assumptions,
         *([light] if isinstance(light, str) else []),
+        *(
+            []
+            if time is None
+            else [f"the readings were divided by the column {table.names[time]!r}, first row 1"]
+        ),
+        *(
+            f"the column {name!r} was not used: readings are not divided by it"
+            for name in unused_factors(table.names)
+        ),
     ]
     if stated_quantity is None:
         assumptions.append(
@@ -449,6 +465,18 @@ def _geometries(ds: xr.Dataset) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     rank = np.empty_like(order)
     rank[order] = np.arange(len(order))
     return rank[place.ravel()], first[order]
+
+
+def _exposures(table: Table) -> NDArray[np.float64]:
+    """Exposure of each row, relative to the first; 1 where no column tells it."""
+    index = exposure_column(table.names)
+    if index is None:
+        return np.ones(len(table))
+    found = np.asarray(table.numbers(index))
+    bad = np.flatnonzero(~(np.isfinite(found) & (found > 0.0)))
+    if bad.size:
+        raise DataError(f"{table.place(int(bad[0]), index)}: an exposure is a number above 0")
+    return found / found[0]
 
 
 def _light(table: Table) -> list[float] | str | None:
