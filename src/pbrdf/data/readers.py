@@ -33,8 +33,7 @@ __all__ = [
 #: Entry points of this group are readers: the name is that of the format, the object a ``Reader``.
 GROUP = "pbrdf.readers"
 
-#: The modules of the formats of this package, each with its declaration, ``READER``. By name, because that of readings
-#: stands a floor above, where they are reduced.
+#: The modules of the formats of this package, each with its declaration, ``READER``.
 _OWN = {
     "csv": "pbrdf.data.formats.csv_table.reading",
     "netcdf": "pbrdf.data.formats.netcdf",
@@ -42,8 +41,9 @@ _OWN = {
     "scatmech": "pbrdf.data.formats.scatmech",
     "cornell": "pbrdf.data.formats.cornell",
     "pbsdf": "pbrdf.data.formats.pbsdf",
-    "merl": "pbrdf.data.formats.merl",
+    # by name alone, for it stands a floor above, where readings are reduced
     "readings": "pbrdf.instruments.reduction.reading_tables",
+    "merl": "pbrdf.data.formats.merl",
 }
 _registered: dict[str, Reader] = {}
 
@@ -91,15 +91,13 @@ def read(
         For CSV: the file's column names by the names used here, see
         :func:`pbrdf.data.formats.csv_table.reading.read_csv`.
     format
-        ``"csv"``, ``"netcdf"``, ``"zarr"``, ``"scatmech"``, ``"cornell"``, ``"pbsdf"``, ``"merl"``, ``"readings"`` or
-        one that was added (:func:`register_reader`); None finds it out from the extension and the content.
+        ``"csv"``, ``"netcdf"``, ``"zarr"``, ``"scatmech"``, ``"cornell"``, ``"pbsdf"``, ``"merl"`` or one that was
+        added (:func:`register_reader`); None finds it out from the extension and the content.
     **options
         Options of the format's reader: for ``"csv"`` those of :func:`pbrdf.data.formats.csv_table.reading.read_csv`
         (`where`, `skip_invalid`, `quantity`, `azimuth`, `stokes`, `illumination`, `cosine_weighted`,
-        `angles`); for ``"readings"``, readings behind an analyser, the same and `analyzer`
-        (:mod:`pbrdf.instruments.reduction.reading_tables`); for ``"scatmech"``, ``"cornell"`` and ``"pbsdf"``
-        `wavelength` in nm, one or several; for ``"pbsdf"`` and ``"merl"`` `every`, see
-        :func:`pbrdf.data.formats.pbsdf.read_pbsdf`.
+        `angles`); for ``"scatmech"``, ``"cornell"`` and ``"pbsdf"`` `wavelength` in nm, one or several; for
+        ``"pbsdf"`` and ``"merl"`` `every`, see :func:`pbrdf.data.formats.pbsdf.read_pbsdf`.
 
     Returns
     -------
