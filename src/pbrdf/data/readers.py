@@ -41,6 +41,7 @@ _OWN = {
     "scatmech": "pbrdf.data.formats.scatmech",
     "cornell": "pbrdf.data.formats.cornell",
     "pbsdf": "pbrdf.data.formats.pbsdf",
+    "spectraray": "pbrdf.data.formats.spectraray",
     # by name alone, for it stands a floor above, where readings are reduced
     "readings": "pbrdf.instruments.reduction.reading_tables",
     "merl": "pbrdf.data.formats.merl",
