@@ -5,10 +5,10 @@ nm. A Mueller matrix has sixteen columns, row by row, divided by its first eleme
 stand side by side. The layout is that of two public files of pyElli (PyEllips/pyElli on GitHub: ``examples/SiO2_Si
 Mueller Matrix/Wafer_MM_70.txt``, ``tests/test_spectraray/Si_SiO2_theta_50_60_70.txt``).
 
-The geometry is that of the mirror: θ_r = θ_i, φ = 0. Q is I_p − I_s, and tan ψ e^{iΔ} = r_p/r_s with r_p = −r_s at normal
-incidence, for fields e^{+iωt}, as here. Their Mueller matrix counts V the other way round: M34 = +sin 2ψ sin Δ, which is
-−m23. The file of a film of SiO2 (104 nm) on silicon at 70.2° decides it: with this sign the elements fit to 0.02, with
-the other they do not for any thickness (``tests/data/formats/test_spectraray.py``).
+The geometry is that of the mirror: θ_r = θ_i, φ = 0. Q is I_p − I_s, and tan ψ e^{iΔ} = r_p/r_s with r_p = −r_s at
+normal incidence, for fields e^{+iωt}, as here. Their Mueller matrix counts V the other way round: M34 = +sin 2ψ sin Δ,
+which is −m23. The file of a film of SiO2 (104 nm) on silicon at 70.2° decides it: with this sign the elements fit to
+0.02, with the other they do not for any thickness (``tests/data/formats/test_spectraray.py``).
 
 ψ and Δ tell the matrix of a sample that is isotropic and does not depolarise: m01 = −cos 2ψ, m22 = sin 2ψ cos Δ, m23 =
 −sin 2ψ sin Δ. The other elements, which follow from these, stay open: they are no further measurements.
@@ -94,6 +94,7 @@ def read_spectraray(path: str | Path) -> xr.Dataset:
             "theta_r": theta,
             "phi": np.zeros_like(theta),
             "wavelength": np.repeat(values[:, 0], len(blocks)),
+            "group": None,
         },
         {"mueller_over_m00": matrices},
         {},
