@@ -163,6 +163,15 @@ _READING: dict[str, tuple[Any, Any]] = {
         ),
         None,
     ),
+    "analyzer": (
+        _reading_option(
+            list[str] | None,
+            "How readings behind an analyser (I0, I45, …) were taken, e.g. zero=s, dark=0.4 or retardance=127 "
+            "(repeatable).",
+            metavar="KEY=VALUE",
+        ),
+        None,
+    ),
     "select": (
         _reading_option(
             list[str] | None,
@@ -251,7 +260,7 @@ def with_reading_options(command: Callable[..., None]) -> Callable[..., None]:
     @functools.wraps(command)
     def run(**given: Any) -> None:
         options = {name: given.pop(name) for name in _READING}
-        for name in ("column", "where", "select", "wavelength"):
+        for name in ("column", "where", "analyzer", "select", "wavelength"):
             options[name] = list(options[name] or ())
         command(reading=Reading(**options), **given)
 

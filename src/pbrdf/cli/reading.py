@@ -31,7 +31,7 @@ class Reading:
     ----------
     format, quantity, azimuth, stokes, illumination, cosine_weighted, angles, skip_invalid, every, sheet
         As in :func:`pbrdf.read`; None and False where not given.
-    column, where, select
+    column, where, analyzer, select
         Texts ``NAME=VALUE``.
     wavelength
         Wavelengths in nm.
@@ -39,6 +39,7 @@ class Reading:
 
     column: list[str]
     where: list[str]
+    analyzer: list[str]
     select: list[str]
     wavelength: list[float]
     skip_invalid: bool
@@ -79,7 +80,11 @@ class Reading:
         options = {
             name: value for name, value in self.stated().items() if name not in ("select", "wavelength")
         }
-        for name, example in (("column", "I=f_r_per_sr"), ("where", "material=white")):
+        for name, example in (
+            ("column", "I=f_r_per_sr"),
+            ("where", "material=white"),
+            ("analyzer", "zero=s"),
+        ):
             if name in options:
                 options[name] = pairs(options[name], f"--{name}", example)
         if Path(source).exists():

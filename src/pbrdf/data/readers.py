@@ -45,6 +45,9 @@ _OWN = {
     "zemax": "pbrdf.data.formats.zemax",
     "rgl": "pbrdf.data.formats.rgl",
     "pbsdf": "pbrdf.data.formats.pbsdf",
+    "spectraray": "pbrdf.data.formats.spectraray",
+    # by name alone, for it stands a floor above, where readings are reduced
+    "readings": "pbrdf.instruments.reduction.reading_tables",
     "merl": "pbrdf.data.formats.merl",
     "fred": "pbrdf.data.formats.fred",
     "speos": "pbrdf.data.formats.speos",

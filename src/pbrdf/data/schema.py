@@ -59,6 +59,8 @@ Attributes
         ``"arbitrary"`` where an unknown constant factor is left in the values.
     ``assumptions`` (optional)
         Sentences: what a reader assumed because the file did not say.
+    ``readings`` (optional)
+        What each reading behind an analyser was taken for, where the Stokes parameters come from such.
 
 Further attributes are kept if they are text, finite numbers or lists of these.
 """

@@ -47,6 +47,8 @@ def describe(ds: xr.Dataset) -> list[str]:
         f"standard uncertainties of {', '.join(map(written, uncertain)) if uncertain else 'nothing'}"
         f"{_covariances_in_words(ds)}"
     )
+    if readings := ds.attrs.get("readings"):
+        lines.append(f"from readings behind an analyser: {_listed(list(readings))}")
     return lines
 
 

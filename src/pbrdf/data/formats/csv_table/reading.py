@@ -17,7 +17,7 @@ from pbrdf.data.validation import check, validate
 from pbrdf.errors import DataError
 from pbrdf.files.delimited import TABLE_EXTENSIONS, Table, read_table
 
-__all__ = ["READER", "read_csv"]
+__all__ = ["READER", "read_csv", "read_rows", "selected"]
 
 
 def read_csv(
@@ -65,8 +65,44 @@ def read_csv(
     DataError
         Names the file, the line (from 1) and the column.
     """
-    path = Path(path)
-    table = read_table(path, sheet)
+    ds, _ = read_rows(
+        read_table(Path(path), sheet),
+        column=column,
+        where=where,
+        skip_invalid=skip_invalid,
+        quantity=quantity,
+        azimuth=azimuth,
+        stokes=stokes,
+        illumination=illumination,
+        cosine_weighted=cosine_weighted,
+        angles=angles,
+    )
+    return ds
+
+
+def read_rows(
+    table: Table,
+    *,
+    column: Mapping[str, str] | None = None,
+    where: Mapping[str, str] | None = None,
+    skip_invalid: bool = False,
+    quantity: str | None = None,
+    azimuth: str | None = None,
+    stokes: str | None = None,
+    illumination: str | Sequence[float] | None = None,
+    cosine_weighted: bool | str | None = None,
+    angles: str | None = None,
+) -> tuple[xr.Dataset, list[int]]:
+    """The rows of a table that is read already, with the options of :func:`read_csv`.
+
+    Returns
+    -------
+    xarray.Dataset
+        As :func:`read_csv` returns it.
+    list of int
+        The line of the file that each of its rows came from.
+    """
+    path = table.path
     table.require_rows()
     options = {
         "quantity": quantity,
@@ -80,7 +116,7 @@ def read_csv(
     header = Header.parse(path, statements(table) | given)
     columns, ignored = resolve_columns(path, table.names, column or {})
     if where:
-        table = _selected(table, where)
+        table = selected(table, where)
 
     values = {source.variable: column_values(table, source, header) for source in columns}
     names = {c.variable: table.names[c.index] for c in columns if c.index is not None}
@@ -91,10 +127,11 @@ def read_csv(
     if skip_invalid:
         ds, lines = _without_invalid(ds, lines)
     validate(ds, origin=table.origin, lines=lines, columns=names)
-    return ds
+    return ds, lines
 
 
-def _selected(table: Table, where: Mapping[str, str]) -> Table:
+def selected(table: Table, where: Mapping[str, str]) -> Table:
+    """The rows that have these texts in these columns; raises DataError if there is no such column or row."""
     keep = list(range(len(table)))
     for name, text in where.items():
         if name not in table.names:
