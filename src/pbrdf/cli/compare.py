@@ -18,7 +18,8 @@ from pbrdf.cli.options import (
     seed_option,
     with_reading_options,
 )
-from pbrdf.cli.reading import Reading
+from pbrdf.cli.reading import Reading, print_columns
+from pbrdf.cli.wavelengths import require_choice
 from pbrdf.errors import FitError, PbrdfError
 
 __all__ = ["compare"]
@@ -117,6 +118,9 @@ def compare(
     from pbrdf.report.comparison.summary import print_summary
 
     dataset = reading.open(file)
+    require_choice(dataset, reading, file)
+    if not quiet:
+        print_columns(dataset, file)
     arguments: dict[str, Any] = {
         "hold_out": hold_out,
         "by": by,

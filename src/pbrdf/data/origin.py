@@ -1,7 +1,7 @@
 """Where the rows and the variables of a data set came from: lines and columns of a file.
 
-It travels with the data set, not in it: no attribute, no variable, nothing that is written. Rows that were chosen or put
-in another order since have no lines.
+It travels with the data set, not in it: no attribute, no variable, nothing that is written. Rows that were chosen or
+put in another order since have no lines.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """One geometry measured more than once: exact duplicates of rows, and repeats that disagree.
 
 Repeats that agree within their uncertainties are what a careful measurement has. Exact duplicates are no second
-measurement and yet count as one: n copies of a row shrink the errors of a fit by √n. Repeats that disagree are often two
-samples in one file; a column that was not used and has another value in each tells them apart.
+measurement and yet count as one: n copies of a row shrink the errors of a fit by √n. Repeats that disagree are often
+two samples in one file; a column that was not used and has another value in each tells them apart.
 """
 
 from __future__ import annotations

@@ -31,8 +31,8 @@ def to_brdf_scale(ds: xr.Dataset) -> xr.Dataset:
     """The same data as a BRDF, uncertainties and covariances included.
 
     A reflectance factor is divided by π, radiance and digital numbers by cos θ_i. The unknown factor of the
-    last two stays in the values, which the attribute ``scale = "arbitrary"`` records. Degree and angle of
-    polarisation are not touched.
+    last two stays in the values, which the attribute ``scale = "arbitrary"`` records unless they state
+    ``"absolute"``. Degree and angle of polarisation are not touched.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def to_brdf_scale(ds: xr.Dataset) -> xr.Dataset:
         put(COVARIANCE, covariance)
     result.attrs["quantity"] = "brdf"
     if quantity in ("radiance", "dn"):
-        result.attrs["scale"] = "arbitrary"
+        result.attrs.setdefault("scale", "arbitrary")
     return result
 
 

@@ -378,7 +378,7 @@ def _values(ds: xr.Dataset, labels: _Labels) -> Iterator[Issue]:
         if name in VARIABLES:
             measured |= np.any(~np.isnan(values), axis=1)
         elif name != COVARIANCE:
-            if name.endswith("_std"):
+            if name.endswith("_std") and COVARIANCE not in ds.data_vars:
                 yield from _unstated(ds, name, labels)
             bad = np.flatnonzero(np.any(values <= 0, axis=1))
             if bad.size:
@@ -405,7 +405,8 @@ def _unstated(ds: xr.Dataset, name: str, labels: _Labels) -> Iterator[Issue]:
     if without.size:
         yield _warning(
             name,
-            f"{labels.variable(name)}, {labels.rows(without)}: no uncertainty is stated, though others are; a fit by the "
+            f"{labels.variable(name)}, {labels.rows(without)}: no uncertainty is stated, though others "
+            "are; a fit by the "
             "stated uncertainties leaves the value out",
             without,
         )
@@ -442,7 +443,8 @@ def _repeats(ds: xr.Dataset, labels: _Labels) -> Iterator[Issue]:
         one = found.disagreeing[found.sets == found.sets[0]]
         yield _warning(
             "",
-            f"{sets} {'geometries were' if sets > 1 else 'geometry was'} measured more than once with values that disagree "
+            f"{sets} {'geometries were' if sets > 1 else 'geometry was'} measured more than once with "
+            "values that disagree "
             f"({labels.rows(one)}); {advice}",
             found.disagreeing,
         )

@@ -30,6 +30,15 @@ def notes_on(
                 f"One set of parameters was fitted to {len(wavelengths)} wavelengths at once; select one, or let "
                 f"{amplitude} be free for each, if the colour of the coating matters."
             )
+    scale = dataset.attrs.get("scale")
+    unknown = scale == "arbitrary" or (
+        dataset.attrs["quantity"] in ("radiance", "dn") and scale != "absolute"
+    )
+    if unknown and not any(term.nuisance and term.role == "gain" for term in result.space.terms):
+        notes.append(
+            "The data are on an arbitrary scale and no gain was fitted: the height of the lobe, and what rests on it, "
+            "was compared with an absolute one; add the nuisance gain (--nuisance gain), or state --scale absolute."
+        )
     if not solution.converged[best]:
         notes.append(
             f"The best start did not converge ({Status(solution.status[best]).name.lower()}); raise the number "

@@ -257,7 +257,8 @@ class _Resolution:
             first = min(elements.values(), key=lambda n: n.element or (9, 9))
             i, j = first.element or (1, 1)
             self.assumptions.append(
-                f"no Mueller element has an index 0, so they were taken as counted from 1: {first.text} as m{i - 1}{j - 1}"
+                f"no Mueller element has an index 0, so they were taken as counted from 1: {first.text} "
+                f"as m{i - 1}{j - 1}"
             )
         moved = {}
         for index, n in elements.items():
@@ -278,7 +279,8 @@ class _Resolution:
     def _both(self, variable: str, index: int) -> None:
         other = self.table.names[self.columns[variable].index or 0]
         raise DataError(
-            f"{self.path}: the columns {other!r} and {self.table.names[index]!r} both stand for {variable}; choose with "
+            f"{self.path}: the columns {other!r} and {self.table.names[index]!r} both stand for "
+            f"{variable}; choose with "
             f"column={{{variable!r}: …}}"
         )
 
@@ -319,7 +321,8 @@ class _Resolution:
             and self.header.coverage is None
         ):
             raise DataError(
-                f"{self.path}: the column {column.name.text!r} is an expanded uncertainty: state its coverage factor k, "
+                f"{self.path}: the column {column.name.text!r} is an expanded uncertainty: state its "
+                "coverage factor k, "
                 "for example coverage=2 (1 if it is a standard uncertainty), or leave the column out with "
                 f"ignore=[{column.name.text!r}]"
             )
@@ -336,8 +339,10 @@ class _Resolution:
                         f"{self.path}: phi_i and phi_r make phi together; name both with the option column"
                     )
                 raise DataError(
-                    f"{self.path}: the column {self.table.names[column.index]!r} looks like an azimuth, of one of source "
-                    "and viewer alone; name the other with column={'phi_i': …} or column={'phi_r': …}, or say that it is "
+                    f"{self.path}: the column {self.table.names[column.index]!r} looks like an azimuth, "
+                    "of one of source "
+                    "and viewer alone; name the other with column={'phi_i': …} or column={'phi_r': …}, "
+                    "or say that it is "
                     f"relative to the source with column={{'phi': {self.table.names[column.index]!r}}}, or "
                     "column={'phi': '=0'} if it does not matter"
                 )

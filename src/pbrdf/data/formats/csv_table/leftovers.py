@@ -43,7 +43,8 @@ def require_no_lost_azimuth(
         name = names[index]
         if not has_azimuth and not name.uncertainty and _AZIMUTH.search(name.text.lower()):
             raise DataError(
-                f"{table.path}: the column {name.text!r} looks like an azimuth; say which one is relative to the source "
+                f"{table.path}: the column {name.text!r} looks like an azimuth; say which one is relative "
+                "to the source "
                 "with column={'phi': …}, or column={'phi': '=0'} if it does not matter"
             )
 
@@ -68,10 +69,14 @@ def remark_on(table: Table, name: Name, index: int, measured: Sequence[str]) -> 
             f"column={{'wavelength': {text!r}}}, {one}, or {leave}"
         )
     if _AZIMUTH.search(lowered):
-        return f"the column {text!r} looks like an azimuth and is not used; use it with column={{'phi': {text!r}}}, or {leave}"
+        return (
+            f"the column {text!r} looks like an azimuth and is not used; use it with "
+            f"column={{'phi': {text!r}}}, or {leave}"
+        )
     if _SAMPLE.search(lowered) or words & _SAMPLE_WORDS:
         return (
-            f"the column {text!r} holds {len(values)} values ({shown}) and is not used, so their rows are mixed; {one}, "
+            f"the column {text!r} holds {len(values)} values ({shown}) and is not used, so their rows are "
+            f"mixed; {one}, "
             f"keep them apart with column={{'group': {text!r}}}, or {leave}"
         )
     return None
@@ -87,7 +92,10 @@ def _remark_on_uncertainty(name: Name, measured: Sequence[str], leave: str) -> s
         return None
     target = owner if owner in measured else measured[0] if len(measured) == 1 else "…"
     key = std_name(target) if target != "…" else "…_std"
-    return f"the column {name.text!r} looks like an uncertainty and is not used; use it with column={{{key!r}: {name.text!r}}}, or {leave}"
+    return (
+        f"the column {name.text!r} looks like an uncertainty and is not used; use it with "
+        f"column={{{key!r}: {name.text!r}}}, or {leave}"
+    )
 
 
 #: Illumination by light polarised along s or p, Q = I_p − I_s.
@@ -120,7 +128,9 @@ def require_one_polarization(
             for v in values
         ]
         raise DataError(
-            f"{table.path}: the column {text!r} says that the light was polarised ({', '.join(values)}); if that is the "
-            f"incident light, read {'one state at a time, with ' if len(values) > 1 else 'it with '}{', or with '.join(ways)}"
+            f"{table.path}: the column {text!r} says that the light was polarised ({', '.join(values)}); "
+            "if that is the "
+            "incident light, read "
+            f"{'one state at a time, with ' if len(values) > 1 else 'it with '}{', or with '.join(ways)}"
             f" (Q = I_p - I_s; s-p turns the sign); if it does not matter, leave the column out with ignore=[{text!r}]"
         )

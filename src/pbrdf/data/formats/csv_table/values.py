@@ -235,7 +235,8 @@ class _Conversion:
                 implied = "reflectance_factor"
                 if self.header.quantity is None and values.name.key not in GUESSED:
                     self.assumptions.append(
-                        f"the column {self._name(values)!r} is in {unit.text} and was taken for a reflectance factor, π times "
+                        f"the column {self._name(values)!r} is in {unit.text} and was taken for a "
+                        "reflectance factor, π times "
                         "the BRDF; if it is something else, state the quantity"
                     )
         if implied is None and values is not None:
@@ -295,7 +296,8 @@ class _Conversion:
         if (own.kind if own else None) != (of_first.kind if of_first else None) and column is not first:
             raise DataError(
                 f"{self.table.path}: the column {self._name(column)!r} is in {column.unit or 'no unit'}, "
-                f"{self._name(first)!r} in {first.unit or 'no unit'}: state the same with unit={{{column.variable!r}: …}}, or "
+                f"{self._name(first)!r} in {first.unit or 'no unit'}: state the same with "
+                f"unit={{{column.variable!r}: …}}, or "
                 f"leave the column out with ignore=[{self._name(column)!r}]"
             )
         factor = 1.0 if own is None or of_first is None else own.factor / of_first.factor

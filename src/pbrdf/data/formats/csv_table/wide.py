@@ -65,7 +65,8 @@ def long_table(table: Table, mapping: Mapping[str, str]) -> tuple[Table, dict[st
         kind, wavelength = spelt
         if wavelength in found[kind]:
             raise DataError(
-                f"{table.path}: the columns {table.names[found[kind][wavelength]]!r} and {name!r} are both {wavelength:g} nm"
+                f"{table.path}: the columns {table.names[found[kind][wavelength]]!r} and {name!r} are "
+                f"both {wavelength:g} nm"
             )
         found[kind][wavelength] = index
     columns = {kind: places for kind, places in found.items() if len(places) > 1}
@@ -76,7 +77,8 @@ def long_table(table: Table, mapping: Mapping[str, str]) -> tuple[Table, dict[st
         if sorted(places) != wavelengths:
             odd = sorted(set(places) ^ set(wavelengths))[0]
             raise DataError(
-                f"{table.path}: the columns of wavelengths do not go together: {kind!r} and {next(iter(columns))!r} differ "
+                f"{table.path}: the columns of wavelengths do not go together: {kind!r} and "
+                f"{next(iter(columns))!r} differ "
                 f"at {odd:g} nm"
             )
     for places in columns.values():
