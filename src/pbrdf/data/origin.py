@@ -50,7 +50,8 @@ class Origin:
 
 def remember(ds: xr.Dataset, origin: Origin) -> None:
     """Note on a data set where it came from."""
-    ds.encoding[_KEY] = (_fingerprint(ds), origin)
+    # a dictionary of its own: xarray lets a selection share that of the whole
+    ds.encoding = {**ds.encoding, _KEY: (_fingerprint(ds), origin)}
 
 
 def origin_of(ds: xr.Dataset) -> Origin | None:

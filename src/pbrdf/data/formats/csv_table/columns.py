@@ -6,12 +6,14 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
 from pbrdf.data.formats.csv_table.header import Header
 from pbrdf.data.formats.csv_table.hints import comment_units, option_units, units_of_columns
 from pbrdf.data.formats.csv_table.leftovers import (
-    distinct,
     remark_on,
     require_no_lost_azimuth,
+    require_one_illumination,
     require_one_polarization,
 )
 from pbrdf.data.formats.csv_table.names import (
@@ -21,9 +23,11 @@ from pbrdf.data.formats.csv_table.names import (
     COVARIANCES,
     ELEMENTS,
     GUESSED,
+    MISSING,
     Name,
     parse_name,
 )
+from pbrdf.data.formats.csv_table.units import parse_unit
 from pbrdf.data.schema import std_name
 from pbrdf.errors import DataError
 from pbrdf.files.delimited import Table
@@ -163,6 +167,7 @@ class _Resolution:
         require_no_lost_azimuth(
             self.table, self.names, looked_at, "phi" in self.columns or "phi_i" in self.columns
         )
+        require_one_illumination(self.table, self.names, looked_at, self._measured())
         require_one_polarization(self.table, self.names, looked_at, self.header.illumination_stated)
         for index in looked_at:
             if index not in self.said and (
@@ -210,27 +215,33 @@ class _Resolution:
                 side = "r" if "theta_i" in variables else "i" if "theta_r" in variables else None
                 if side:
                     found[index] = _renamed(name, f"{kind}_{side}")
-            if self._is_no_stokes(index, name, names):
-                found[index] = _renamed(name, None)
+            if self._is_no_stokes(name, names):
+                found[index] = self._no_stokes(index, name)
         return self._elements(found)
 
-    def _is_no_stokes(self, index: int, name: Name, names: Mapping[int, Name]) -> bool:
+    def _is_no_stokes(self, name: Name, names: Mapping[int, Name]) -> bool:
         """Whether u, U, v or V is not taken for a Stokes parameter: a coordinate, an uncertainty, a voltage."""
-        text = re.sub(r"[\[({].*", "", name.text).strip()
+        text = _bare(name)
         if name.uncertainty or text not in ("u", "v", "U", "V"):
             return False
-        others = {re.sub(r"[\[({].*", "", n.text).strip() for n in names.values()} | self.columns.keys()
+        others = {_bare(n) for n in names.values()} | self.columns.keys()
         if any(n.variable == "Q" and not n.uncertainty for n in names.values()) or "Q" in self.columns:
             return False
-        if text.isupper() and others & {"I", "S0", "s0"} and "stokes" not in self.header.unstated:
-            return False
+        return text.islower() or not others & {"I", "S0", "s0"} or "stokes" in self.header.unstated
+
+    def _no_stokes(self, index: int, name: Name) -> Name:
+        """What a column called u, U, v or V is in a file without Q; DataError where that is not clear."""
+        text, unit = _bare(name), parse_unit(self.units[index] or "")
+        if text == "u" and unit is not None and unit.kind in ("share", "per steradian"):
+            return replace(name, variable=None, key="", uncertainty="standard")
         if text.islower():
+            beside = "" if text == "v" else ", or with column={'I_std': 'u'} if it is an uncertainty"
             self._say(
                 index,
                 f"the column {name.text!r} is not taken for the Stokes parameter {text.upper()}, as there is no Q; if "
-                f"it is, say so with column={{{text.upper()!r}: {name.text!r}}}",
+                f"it is, say so with column={{{text.upper()!r}: {name.text!r}}}{beside}",
             )
-            return True
+            return _renamed(name, None)
         other = "an expanded uncertainty" if text == "U" else "a voltage"
         use = " (then column={'I_std': 'U'} with coverage=2 or what k is)" if text == "U" else ""
         raise DataError(
@@ -339,11 +350,10 @@ class _Resolution:
                         f"{self.path}: phi_i and phi_r make phi together; name both with the option column"
                     )
                 raise DataError(
-                    f"{self.path}: the column {self.table.names[column.index]!r} looks like an azimuth, "
-                    "of one of source "
-                    "and viewer alone; name the other with column={'phi_i': …} or column={'phi_r': …}, "
-                    "or say that it is "
-                    f"relative to the source with column={{'phi': {self.table.names[column.index]!r}}}, or "
+                    f"{self.path}: the column {self.table.names[column.index]!r} looks like an azimuth, of one "
+                    "of source and viewer alone; name the other with column={'phi_i': …} or column={'phi_r': …}, "
+                    "or say that it is relative to the source with "
+                    f"column={{'phi': {self.table.names[column.index]!r}}}, or "
                     "column={'phi': '=0'} if it does not matter"
                 )
         if phi is None or not any(pair):
@@ -353,23 +363,26 @@ class _Resolution:
             if column is None:
                 continue
             del self.columns[variable]
-            if column.index is None or (variable == "phi_r" and relative):
+            if column.index is None:
+                continue
+            self.said.add(column.index)
+            if variable == "phi_r" and relative:
+                continue
+            if relative and "phi" not in self.mapping:
                 continue
             name = self.table.names[column.index]
-            values = distinct(self.table, column.index)
-            named_relative = relative and "phi" not in self.mapping
-            if named_relative:
-                continue
-            if len(values) > 1:
+            values = np.unique(self.table.numbers(column.index, MISSING))
+            if values.size > 1:
                 raise DataError(
                     f"{self.path}: the azimuth {name!r} is not constant and would not be used beside phi; give both "
                     "azimuths, of source and viewer, column={'phi_i': …, 'phi_r': …}, or say which is relative to the "
                     f"source with column={{'phi': …}} and leave out the other with ignore=[{name!r}]"
                 )
-            if values and values[0].strip("+-0.") not in ("", "e"):
+            if values[0] != 0.0:
                 self._say(
                     column.index,
-                    f"the azimuth {name!r} is {values[0]} everywhere and is not used; phi was taken as relative to the "
+                    f"the azimuth {name!r} is {values[0]:g} everywhere and is not used; phi was taken as "
+                    "relative to the "
                     "source all the same",
                 )
 
@@ -390,6 +403,11 @@ class _Resolution:
                 f"the column {name.text!r} was taken for a reflectance factor, π times the BRDF; if it is something "
                 "else, state the quantity"
             )
+
+
+def _bare(name: Name) -> str:
+    """A name without what stands in brackets or after a separator."""
+    return re.split(r"[\[({/,]", name.text)[0].strip()
 
 
 def _renamed(name: Name, variable: str | None) -> Name:

@@ -5,12 +5,18 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from pbrdf.data.formats.csv_table.names import Name
+from pbrdf.data.formats.csv_table.names import Name, parse_name
 from pbrdf.data.schema import std_name
 from pbrdf.errors import DataError
 from pbrdf.files.delimited import Table
 
-__all__ = ["distinct", "remark_on", "require_no_lost_azimuth", "require_one_polarization"]
+__all__ = [
+    "distinct",
+    "remark_on",
+    "require_no_lost_azimuth",
+    "require_one_illumination",
+    "require_one_polarization",
+]
 
 _AZIMUTH = re.compile(r"(?<![a-z])phi(?![a-z]{2})|azim")
 _SAMPLE = re.compile(
@@ -101,6 +107,26 @@ def _remark_on_uncertainty(name: Name, measured: Sequence[str], leave: str) -> s
 #: Illumination by light polarised along s or p, Q = I_p − I_s.
 _STATES = {"s": "1,-1,0,0", "p": "1,1,0,0", "te": "1,-1,0,0", "tm": "1,1,0,0"}
 _NATURAL = frozenset(("u", "n", "none", "unpol", "unpolarized", "unpolarised", "natural", "random", "0"))
+
+
+def require_one_illumination(
+    table: Table, names: Sequence[Name], unused: Sequence[int], measured: Sequence[str]
+) -> None:
+    """Raise DataError, with the ways to read each, if the only values are those in s- and in p-polarised light."""
+    if measured:
+        return
+    found = []
+    for index in unused:
+        match = re.fullmatch(r"(.+?)[\s_.\-]*(s|p|te|tm)", names[index].key)
+        if match and parse_name(match[1]).variable == "I":
+            found.append((names[index].text, _STATES[match[2]]))
+    if found:
+        ways = ", or ".join(f"column={{'I': {text!r}}} with illumination='{state}'" for text, state in found)
+        raise DataError(
+            f"{table.path}: the columns {', '.join(text for text, _ in found)} look like values in light "
+            "polarised along "
+            f"s or p; a data set holds one illumination: read one at a time, {ways} (Q = I_p - I_s)"
+        )
 
 
 def require_one_polarization(

@@ -15,7 +15,17 @@ from pbrdf.data.formats.csv_table.units import parse_unit, plain_text
 from pbrdf.data.schema import VARIABLES, std_name
 from pbrdf.optics.stokes import STOKES
 
-__all__ = ["AZIMUTHS", "CHANNELS", "COLUMNS", "COVARIANCES", "ELEMENTS", "GUESSED", "Name", "parse_name"]
+__all__ = [
+    "AZIMUTHS",
+    "CHANNELS",
+    "COLUMNS",
+    "COVARIANCES",
+    "ELEMENTS",
+    "GUESSED",
+    "MISSING",
+    "Name",
+    "parse_name",
+]
 
 ELEMENTS = tuple(f"m{i}{j}" for i in range(4) for j in range(4))
 CHANNELS = (*(name for name in VARIABLES if name != "mueller"), *ELEMENTS)
@@ -99,6 +109,9 @@ GUESSED = {
     "reflectance": "reflectance_factor",
     "r": "reflectance_factor",
 }
+
+#: Texts of cells, in lower case, where nothing was measured.
+MISSING = frozenset(("", "nan", "na"))
 
 _BRACKET = re.compile(r"\[([^\]]*)\]|\(([^()]*(?:\([^()]*\)[^()]*)*)\)|\{([^}]*)\}")
 _COVERAGE = re.compile(r"k\s*=?\s*(\d+(?:\.\d+)?)")
@@ -370,6 +383,8 @@ def _uncertainty(words: list[str], parts: _Parts) -> tuple[str | None, list[str]
             elif match[2] and not parts.standard:
                 parts.expanded = True
             return _kind(parts, "standard"), left
+    if len(words) == 2 and lowered[0] == "s" and words[1] in STOKES:
+        return "vague", words[1:]  # or values in s-polarised light
     if words and re.fullmatch(r"u[IQUV]", words[0]) and len(words) == 1:
         return _kind(parts, "standard"), [words[0][1]]
     if words and re.fullmatch(r"U[IQ]", words[0]) and len(words) == 1:

@@ -12,7 +12,7 @@ from pbrdf.data.formats.csv_table.assembly import to_dataset
 from pbrdf.data.formats.csv_table.columns import Resolved, resolve_columns
 from pbrdf.data.formats.csv_table.header import Header, statements
 from pbrdf.data.formats.csv_table.hints import comment_units
-from pbrdf.data.formats.csv_table.names import AZIMUTHS
+from pbrdf.data.formats.csv_table.names import AZIMUTHS, parse_name
 from pbrdf.data.formats.csv_table.values import Values, values_of
 from pbrdf.data.formats.csv_table.wide import long_table
 from pbrdf.data.formats.csv_table.writing import write_csv
@@ -122,7 +122,7 @@ def _origin(
     unused = {
         table.names[index]: tuple(row[index] for row in table.rows)
         for index in resolved.unused
-        if table.names[index] not in ignore
+        if table.names[index] not in ignore and parse_name(table.names[index]).uncertainty is None
     }
     names = {variable: table.names[index] for index, variable in taken.items() if variable not in AZIMUTHS}
     return Origin(

@@ -13,17 +13,15 @@ from pbrdf.data import conventions
 from pbrdf.data.build import group_labels
 from pbrdf.data.formats.csv_table.columns import ANGLE_COLUMNS, CHANNELS, COVARIANCES, ELEMENTS, Column
 from pbrdf.data.formats.csv_table.header import Header
-from pbrdf.data.formats.csv_table.names import AZIMUTHS, GUESSED
+from pbrdf.data.formats.csv_table.names import AZIMUTHS, GUESSED, MISSING
 from pbrdf.data.formats.csv_table.units import SIGNALS, Unit, parse_unit
 from pbrdf.data.schema import QUANTITIES
 from pbrdf.errors import DataError
 from pbrdf.files.delimited import Table
 from pbrdf.optics.stokes import STOKES
 
-__all__ = ["MISSING", "Values", "values_of"]
+__all__ = ["Values", "values_of"]
 
-#: Texts of cells, in lower case, where nothing was measured.
-MISSING = frozenset(("", "nan", "na"))
 #: A median of DoLP above this, of so many values, is no fraction; single values may be, of a noisy measurement.
 _NO_FRACTION, _MANY = 1.5, 5
 #: A median reflectance factor above this is rather per cent.
@@ -196,7 +194,7 @@ class _Conversion:
 
     def _wavelength(self, column: Column) -> NDArray[np.float64]:
         values = self._numbers(column)
-        unit = self._unit(column, ("length", "wavenumber"), "nm or um")
+        unit = self._unit(column, ("length", "wavenumber"), "nm, um or cm^-1")
         if unit is None:
             text = "nm"
         elif unit.kind == "wavenumber":
@@ -226,6 +224,12 @@ class _Conversion:
         implied = column.quantity if column else None
         values = self.columns.get("I") or next((c for v, c in self.columns.items() if v in ELEMENTS), None)
         unit = parse_unit(values.unit) if values is not None and values.unit else None
+        if (
+            values is not None
+            and unit is not None
+            and unit.kind in ("degrees", "radians", "length", "wavenumber")
+        ):
+            raise self._refusal(values, unit, "1/sr, 1/msr, % or that of a signal")
         if implied is None and unit is not None:
             if unit.kind == "per steradian":
                 implied = "brdf"

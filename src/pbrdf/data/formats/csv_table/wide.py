@@ -10,9 +10,8 @@ from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import replace
 
-from pbrdf.data.formats.csv_table.names import CHANNELS, parse_name
+from pbrdf.data.formats.csv_table.names import CHANNELS, MISSING, parse_name
 from pbrdf.data.formats.csv_table.units import plain_text
-from pbrdf.data.formats.csv_table.values import MISSING
 from pbrdf.errors import DataError
 from pbrdf.files.delimited import Table
 
@@ -23,7 +22,7 @@ _WITH_UNIT = re.compile(
     rf"(?P<before>.*?)[\s_.@(\[]*{_NUMBER}\s*_?(?P<unit>nm|um|micron)[)\]]?(?P<after>.*)", re.IGNORECASE
 )
 _BARE = re.compile(
-    rf"(?P<before>[A-Za-z_ ]*?(?:\([^)]*\))?)[\s_@]*{_NUMBER}(?P<after>(?:[\s_](?:std|unc|err|sd))?)"
+    rf"(?P<before>[A-Za-z_ ]*?)[\s_@(\[]*{_NUMBER}[)\]]?(?P<after>(?:[\s_](?:std|unc|err|sd))?)"
 )
 #: Bare numbers that are wavelengths in nm.
 _SHORTEST, _LONGEST = 150.0, 25000.0
