@@ -24,8 +24,10 @@ def check(
     from pbrdf.report.dataset.describe import columns_in_words, describe, on_the_command_line
 
     dataset = reading.open(file, say=False)
-    for line in (*describe(dataset), *columns_in_words(dataset)):
+    for line in describe(dataset):
         print(line)
+    for i, line in enumerate(columns_in_words(dataset)):
+        print(line if i else f"columns: {line}")
     issues = issues_of(dataset)
     for issue in issues:
         print(f"{issue.severity}: {on_the_command_line(str(issue))}")

@@ -119,8 +119,6 @@ def compare(
 
     dataset = reading.open(file)
     require_choice(dataset, reading, file)
-    if not quiet:
-        print_columns(dataset, file)
     arguments: dict[str, Any] = {
         "hold_out": hold_out,
         "by": by,
@@ -143,5 +141,6 @@ def compare(
         print(folder)
         return
     console = output_console()
+    print_columns(dataset, file)
     print_summary(report, console)
     console.print(f"\nWritten to {folder}/: {', '.join(path.name for path in written)}", markup=False)

@@ -18,7 +18,7 @@ from pbrdf.cli.options import (
     seed_option,
     with_reading_options,
 )
-from pbrdf.cli.reading import Reading, print_columns
+from pbrdf.cli.reading import Reading
 from pbrdf.cli.values import bounds as read_bounds
 from pbrdf.cli.values import numbers, pairs
 from pbrdf.cli.wavelengths import require_choice
@@ -218,8 +218,6 @@ def fit(
     for file, folder in zip(files, folders, strict=True):
         dataset = reading.open(file)
         require_choice(dataset, reading, file, by_wavelength="wavelength" in arguments["split"].values())
-        if not quiet:
-            print_columns(dataset, file)
         try:
             with progress_bar(f"Fitting {file}", quiet) as progress:
                 result = fit_dataset(dataset, chosen, progress=progress, **arguments)

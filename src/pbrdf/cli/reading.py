@@ -131,7 +131,7 @@ def print_columns(dataset: xr.Dataset, source: str) -> None:
 
     console = output_console()
     for i, line in enumerate(columns_in_words(dataset)):
-        console.print(f"{source}: {line}" if i == 0 else line, markup=False)
+        console.print(f"Columns of {source}: {line}" if i == 0 else line, markup=False)
 
 
 def _selected(dataset: xr.Dataset, kind: str, text: str, source: str) -> xr.Dataset:

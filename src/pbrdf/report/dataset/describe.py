@@ -72,7 +72,7 @@ def columns_in_words(ds: xr.Dataset) -> list[str]:
         return []
     used = [f"{name} → {meaning}" for name, meaning in origin.meanings if meaning]
     unused = [name for name, meaning in origin.meanings if not meaning and name not in origin.dropped]
-    lines = [f"columns: {', '.join(used)}"]
+    lines = [", ".join(used)]
     if unused:
         lines.append(f"not used: {', '.join(unused)}")
     if origin.dropped:
