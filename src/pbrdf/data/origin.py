@@ -80,5 +80,7 @@ def of_rows(source: xr.Dataset, keep: Sequence[int] | np.ndarray, taken: xr.Data
 
 def _fingerprint(ds: xr.Dataset) -> tuple[Any, ...]:
     return tuple(
-        zlib.crc32(np.ascontiguousarray(ds[name].values)) for name in _COORDINATES if name in ds.coords
+        zlib.crc32(np.ascontiguousarray(ds[name].values).tobytes())
+        for name in _COORDINATES
+        if name in ds.coords
     )

@@ -94,8 +94,9 @@ def read(
     **options
         Options of the format's reader: for ``"csv"`` those of :func:`pbrdf.data.formats.csv_table.reading.read_csv`
         (`where`, `skip_invalid`, `quantity`, `azimuth`, `stokes`, `illumination`, `cosine_weighted`,
-        `angles`); for ``"scatmech"``, ``"cornell"`` and ``"pbsdf"`` `wavelength` in nm, one or several; for
-        ``"pbsdf"`` and ``"merl"`` `every`, see :func:`pbrdf.data.formats.pbsdf.read_pbsdf`.
+        `angles`, `unit`, `coverage`, `scale`, `ignore`); for ``"scatmech"``, ``"cornell"`` and ``"pbsdf"``
+        `wavelength` in nm, one or several; for ``"pbsdf"`` and ``"merl"`` `every`, see
+        :func:`pbrdf.data.formats.pbsdf.read_pbsdf`.
 
     Returns
     -------

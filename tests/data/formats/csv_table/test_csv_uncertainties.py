@@ -178,3 +178,27 @@ def test_covariances_have_the_square_of_the_values_unit(text_file):
 def test_a_coverage_factor_is_a_number_above_0(text_file, text, words):
     with pytest.raises(DataError, match=words):
         read(text_file(f"{STATED}# coverage: {text}\ntheta_i,theta_r,phi,I,U (k=2)\n30,20,0,0.3,0.1\n"))
+
+
+@pytest.mark.parametrize(
+    "comment",
+    ["expanded uncertainties, k = 2", "Uncertainties are expanded (coverage factor k=2)"],
+)
+def test_a_comment_says_that_the_uncertainties_are_expanded(text_file, comment):
+    names = "theta_i,theta_r,phi,BRDF,uncertainty"
+    ds = read(text_file(f"{STATED}# {comment}\n{names}\n30,20,0,0.3,0.006\n"))
+    assert_allclose(ds["I_std"], [0.003])
+    standard = read(
+        text_file(f"{STATED}# {comment}\n{names.replace('uncert', 'standard uncert')}\n30,20,0,0.3,0.006\n")
+    )
+    assert_allclose(standard["I_std"], [0.006])
+
+
+def test_names_of_any_length_are_read_in_no_time(text_file):
+    names = ["_" * 100_000, "(" * 50_000, "I" * 50_000 + "_400nm"]
+    ds = read(
+        text_file(
+            f"{STATED}# {'theta_i in ' * 20_000}\ntheta_i,theta_r,phi,I,{','.join(names)}\n30,20,0,1,2,3,4\n"
+        )
+    )
+    assert ds.attrs["ignored_columns"] == names

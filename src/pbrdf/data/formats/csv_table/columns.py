@@ -304,6 +304,8 @@ class _Resolution:
         ranks: dict[str, int] = {}
         for index, name in names.items():
             owner = name.variable
+            if self.header.expanded and name.uncertainty == "standard" and _may_be_expanded(name):
+                name = replace(name, uncertainty="expanded")
             if owner is None and not name.key and len(measured) == 1:
                 owner = measured[0]
             if owner not in CHANNELS or name.uncertainty == "vague":
@@ -344,7 +346,7 @@ class _Resolution:
         if phi is None:
             if all(pair):
                 return
-            for column in filter(None, pair):
+            for column in (one for one in pair if one is not None):
                 if column.index is None:
                     raise DataError(
                         f"{self.path}: phi_i and phi_r make phi together; name both with the option column"
@@ -359,9 +361,10 @@ class _Resolution:
         if phi is None or not any(pair):
             return
         relative = "phi" in self.mapping or phi.name.key not in ("phi", "")
-        for variable, column in zip(AZIMUTHS, pair, strict=True):
-            if column is None:
+        for variable in AZIMUTHS:
+            if variable not in self.columns:
                 continue
+            column = self.columns[variable]
             del self.columns[variable]
             if column.index is None:
                 continue
@@ -408,6 +411,12 @@ class _Resolution:
 def _bare(name: Name) -> str:
     """A name without what stands in brackets or after a separator."""
     return re.split(r"[\[({/,]", name.text)[0].strip()
+
+
+def _may_be_expanded(name: Name) -> bool:
+    """Whether the words for an uncertainty leave open of which kind it is."""
+    text = name.text.lower()
+    return name.coverage is None and "unc" in text and not re.search("std|standard|sigma", text)
 
 
 def _renamed(name: Name, variable: str | None) -> Name:

@@ -16,6 +16,10 @@ from pbrdf.files.delimited import Table
 __all__ = ["Header", "statements"]
 
 _OWN_KEYS = ("quantity", "illumination", "simulated", "scale", *FILE_KEYS)
+#: The key, which no line can have, of a remark that the uncertainties are expanded ones.
+_EXPANDED = "expanded uncertainties"
+#: Characters of a remark.
+_LOOKED_AT = 200
 _ANGLES = {"degrees": True, "radians": False, "deg": True, "rad": False, "degree": True, "radian": False}
 _YES_NO = {"yes": True, "1": True, "true": True, "no": False, "0": False, "false": False}
 
@@ -29,6 +33,12 @@ def statements(table: Table) -> dict[str, str]:
             key, value = statement[1], statement[2].strip()
             lowered = key.lower()
             stated[lowered if lowered in (*_OWN_KEYS, *TEXT_ATTRIBUTES) else key] = value
+        elif line < table.names_line and re.search(r"(?i)expanded|coverage factor", comment[:_LOOKED_AT]):
+            stated[_EXPANDED] = "expanded" if "expanded" in comment.lower() else ""
+            if factor := re.search(
+                r"(?<![\w.])(?:k|factor)\s*(?:=|of|:)?\s*(\d+(?:\.\d+)?)", comment[:_LOOKED_AT]
+            ):
+                stated.setdefault("coverage", factor[1])
     return stated
 
 
@@ -50,6 +60,8 @@ class Header:
         Whether the illumination is stated.
     coverage
         Coverage factor of expanded uncertainties that do not state their own; None if nothing says so.
+    expanded
+        Whether the file says in words that its uncertainties are expanded ones.
     attrs
         All other statements, as attributes.
     """
@@ -63,6 +75,7 @@ class Header:
     unstated: frozenset[str]
     illumination_stated: bool = False
     coverage: float | None = None
+    expanded: bool = False
     attrs: dict[str, Any] = field(default_factory=dict)
 
     @classmethod
@@ -79,7 +92,9 @@ class Header:
         if "quantity" in statements and statements["quantity"] not in QUANTITIES:
             raise DataError(f"{path}: quantity is {statements['quantity']!r}; use {' or '.join(QUANTITIES)}")
         attrs = {
-            key: decode_attribute(key, value) for key, value in statements.items() if key not in _OWN_KEYS
+            key: decode_attribute(key, value)
+            for key, value in statements.items()
+            if key not in (*_OWN_KEYS, _EXPANDED)
         }
         attrs["simulated"] = int(choose("simulated", _YES_NO, "0"))
         if "scale" in statements:
@@ -94,6 +109,7 @@ class Header:
             unstated=frozenset(("azimuth", "stokes")) - statements.keys(),
             illumination_stated="illumination" in statements,
             coverage=_coverage(path, statements.get("coverage")),
+            expanded=bool(statements.get(_EXPANDED)),
             attrs=attrs,
         )
 

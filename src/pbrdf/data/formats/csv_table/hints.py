@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 
-from pbrdf.data.formats.csv_table.names import Name, parse_name
+from pbrdf.data.formats.csv_table.names import LONGEST, Name, parse_name
 from pbrdf.data.formats.csv_table.units import parse_unit
 from pbrdf.errors import DataError
 from pbrdf.files.delimited import Table
@@ -49,11 +49,13 @@ def comment_units(table: Table) -> tuple[dict[int, str], str | None, frozenset[s
     keys: set[str] = set()
     names = [parse_name(name) for name in table.names]
     for line, comment in table.comments:
-        if line >= table.names_line:
+        if line >= table.names_line or len(comment) > LONGEST * len(names):
             continue
         text = comment.lstrip("#").strip()
         listed = _LIST.fullmatch(text) or _LIST.fullmatch(text.lower())
         if listed and (parts := [part.strip() for part in re.split(r"[,;\t]", listed[1])])[1:]:
+            if not any(map(parse_unit, parts)):
+                continue
             if len(parts) != len(table.names):
                 raise DataError(
                     f"{table.path}: line {line}: {len(parts)} units for {len(table.names)} columns; give one for "
@@ -61,6 +63,8 @@ def comment_units(table: Table) -> tuple[dict[int, str], str | None, frozenset[s
                 )
             units |= {index: part for index, part in enumerate(parts) if part not in ("", "-")}
             keys.add(text.split(":")[0].strip())
+            continue
+        if len(text) > LONGEST:
             continue
         for pattern in _ONE:
             match = re.fullmatch(pattern, text) or re.fullmatch(pattern, text.lower())

@@ -90,14 +90,13 @@ def remark_on(table: Table, name: Name, index: int, measured: Sequence[str]) -> 
 
 def _remark_on_uncertainty(name: Name, measured: Sequence[str], leave: str) -> str | None:
     owner = name.variable
-    if (
-        owner is not None
-        and owner not in measured
-        and owner in ("theta_i", "theta_r", "phi", "wavelength", "group")
-    ):
-        return None
-    target = owner if owner in measured else measured[0] if len(measured) == 1 else "…"
-    key = std_name(target) if target != "…" else "…_std"
+    if owner in ("theta_i", "theta_r", "phi", "wavelength", "group"):
+        return None  # no data set holds uncertainties of directions
+    key = "…_std"
+    if owner is not None and owner in measured:
+        key = std_name(owner)
+    elif len(measured) == 1:
+        key = std_name(measured[0])
     return (
         f"the column {name.text!r} looks like an uncertainty and is not used; use it with "
         f"column={{{key!r}: {name.text!r}}}, or {leave}"

@@ -8,6 +8,7 @@ Expanded uncertainties follow the GUM (JCGM 100:2008): U = k u, with the coverag
 
 from __future__ import annotations
 
+import functools
 import re
 from dataclasses import dataclass
 
@@ -22,6 +23,7 @@ __all__ = [
     "COVARIANCES",
     "ELEMENTS",
     "GUESSED",
+    "LONGEST",
     "MISSING",
     "Name",
     "parse_name",
@@ -112,6 +114,9 @@ GUESSED = {
 
 #: Texts of cells, in lower case, where nothing was measured.
 MISSING = frozenset(("", "nan", "na"))
+
+#: Characters of the longest name, or comment, that is looked into.
+LONGEST = 200
 
 _BRACKET = re.compile(r"\[([^\]]*)\]|\(([^()]*(?:\([^()]*\)[^()]*)*)\)|\{([^}]*)\}")
 _COVERAGE = re.compile(r"k\s*=?\s*(\d+(?:\.\d+)?)")
@@ -263,8 +268,11 @@ class _Parts:
         return words
 
 
+@functools.lru_cache(maxsize=4096)
 def parse_name(name: str) -> Name:
-    """Take a column's name apart; see :class:`Name`."""
+    """Take a column's name apart; see :class:`Name`. One longer than any name is said to be none that is understood."""
+    if len(name) > LONGEST:
+        return Name(name)
     text = plain_text(name)
     element = _ELEMENT.fullmatch(text.lower())
     if element:

@@ -17,7 +17,7 @@ from pbrdf.data.formats.csv_table.values import Values, values_of
 from pbrdf.data.formats.csv_table.wide import long_table
 from pbrdf.data.formats.csv_table.writing import write_csv
 from pbrdf.data.formats.declaration import Reader
-from pbrdf.data.origin import Origin, of_rows, origin_of, remember
+from pbrdf.data.origin import Origin, of_rows, remember
 from pbrdf.data.validation import check, validate
 from pbrdf.errors import DataError
 from pbrdf.files.delimited import Table, read_table
@@ -102,8 +102,7 @@ def read_csv(
     remember(ds, _origin(table, resolved, read, widened, ignore))
     if skip_invalid:
         ds = _without_invalid(ds)
-    origin = origin_of(ds)
-    validate(ds, origin=str(path), lines=origin.lines, columns=origin.columns)
+    validate(ds, origin=str(path))
     return ds
 
 

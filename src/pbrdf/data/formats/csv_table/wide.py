@@ -10,7 +10,7 @@ from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import replace
 
-from pbrdf.data.formats.csv_table.names import CHANNELS, MISSING, parse_name
+from pbrdf.data.formats.csv_table.names import CHANNELS, LONGEST, MISSING, parse_name
 from pbrdf.data.formats.csv_table.units import plain_text
 from pbrdf.errors import DataError
 from pbrdf.files.delimited import Table
@@ -100,15 +100,15 @@ def long_table(table: Table, mapping: Mapping[str, str]) -> tuple[Table, dict[st
         units = [*(table.units[index] for index in kept), "", *first]
     widths = {"wavelength_nm": ""}
     for kind, places in columns.items():
-        first, last = (
-            table.names[places[wavelength]].strip() for wavelength in (wavelengths[0], wavelengths[-1])
-        )
-        widths[kind] = f"{first} … {last} ({len(places)} columns)"
+        ends = [table.names[places[wavelength]] for wavelength in (wavelengths[0], wavelengths[-1])]
+        widths[kind] = f"{' … '.join(ends)} ({len(places)} columns)"
     return replace(table, names=names, rows=rows, lines=lines, units=units), widths
 
 
 def _wavelength(name: str) -> tuple[str, float] | None:
     """What a column for a wavelength holds, as a name, and the wavelength in nm; None for another column."""
+    if len(name) > LONGEST:
+        return None
     text = plain_text(name)
     match = _WITH_UNIT.fullmatch(text)
     if match:
