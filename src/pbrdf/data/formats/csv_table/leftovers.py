@@ -105,7 +105,8 @@ def _remark_on_uncertainty(name: Name, measured: Sequence[str], leave: str) -> s
 
 #: Illumination by light polarised along s or p, Q = I_p − I_s.
 _STATES = {"s": "1,-1,0,0", "p": "1,1,0,0", "te": "1,-1,0,0", "tm": "1,1,0,0"}
-_NATURAL = frozenset(("u", "n", "none", "unpol", "unpolarized", "unpolarised", "natural", "random", "0"))
+_NATURAL_WORDS = "u n none unpol unpolarized unpolarised natural random 0"
+_NATURAL = frozenset(_NATURAL_WORDS.split())
 
 
 def require_one_illumination(

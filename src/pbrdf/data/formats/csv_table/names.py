@@ -121,17 +121,18 @@ LONGEST = 200
 _BRACKET = re.compile(r"\[([^\]]*)\]|\(([^()]*(?:\([^()]*\)[^()]*)*)\)|\{([^}]*)\}")
 _COVERAGE = re.compile(r"k\s*=?\s*(\d+(?:\.\d+)?)")
 _MULTIPLE_SIGMA = re.compile(r"(\d+(?:\.\d+)?)\s*[-_ ]?\s*(?:sigma|sd|std)")
-_STANDARD = frozenset(
-    ("std", "sd", "stdev", "stddev", "stderr", "unc", "uncert", "uncertainty", "err", "error")
+_STANDARD_WORDS = (
+    "std sd stdev stddev stderr unc uncert uncertainty uncertainties err error errors sigma sig se sem"
 )
-_STANDARD |= {"errors", "sigma", "sig", "se", "sem", "uncertainties"}
+_STANDARD = frozenset(_STANDARD_WORDS.split())
 _VARIANCE = frozenset(("var", "variance"))
 _BESIDE = frozenset(
     ("standard", "expanded", "combined", "deviation", "dev", "of", "in", "the", "total", "absolute")
 )
 _BESIDE |= {"abs", "relative", "rel", "type", "random", "measurement"}
 #: Alone they may be something else than the uncertainty of the values.
-_VAGUE = frozenset(("err", "error", "errors", "sigma", "sig", "se", "var", "u"))
+_VAGUE_WORDS = "err error errors sigma sig se var u"
+_VAGUE = frozenset(_VAGUE_WORDS.split())
 _FILLERS = frozenset(
     ("stokes", "parameter", "measured", "panel", "value", "values", "mean", "average", "avg")
 )
@@ -386,7 +387,7 @@ def _uncertainty(words: list[str], parts: _Parts) -> tuple[str | None, list[str]
         said = match[3] or parts.expanded or parts.standard or parts.relative or len(left) < len(words) - 1
         owner = bool(left) and _variable("".join(left)) is not None
         if said or owner or parts.inner:
-            if match[3] and match[3].startswith("k"):
+            if match[3] and match[3] != "95":
                 parts._covered(float(match[3][1:]))
             elif match[2] and not parts.standard:
                 parts.expanded = True

@@ -25,18 +25,9 @@ __all__ = ["SIGNALS", "Unit", "parse_unit", "plain_text"]
 #: Kinds of units that leave a factor of proportionality open.
 SIGNALS = ("signal", "V", "A")
 
-_PREFIXES = {"": 1.0, "k": 1e3, "m": 1e-3, "u": 1e-6, "n": 1e-9, "p": 1e-12}
-_GREEK = {
-    "θ": "theta",
-    "ϑ": "theta",
-    "φ": "phi",
-    "ϕ": "phi",
-    "λ": "lambda",
-    "σ": "sigma",
-    "ρ": "rho",
-    "Δ": "delta ",
-}
-_GREEK |= {"δ": "delta ", "Θ": "theta", "Φ": "phi", "ψ": "psi", "μ": "u"}
+_PREFIXES = dict(zip(("", *"kmunp"), (1.0, 1e3, 1e-3, 1e-6, 1e-9, 1e-12), strict=True))
+_LETTERS = "θ=theta ϑ=theta Θ=theta φ=phi ϕ=phi Φ=phi λ=lambda σ=sigma ρ=rho ψ=psi μ=u"
+_SPELT = {**dict(pair.split("=") for pair in _LETTERS.split()), **dict.fromkeys("Δδ", "delta ")}
 
 
 @dataclass(frozen=True)
@@ -87,8 +78,8 @@ def _table() -> dict[str, Unit]:
 _UNITS = _table()
 #: %, prefix and exponent of an inverse solid angle.
 _PER_SOLID_ANGLE = re.compile(
-    r"(?:(?P<a>1|%)?/|per)(?P<b>[mu]|milli|micro)?(?:sr|steradians?)"
-    r"|(?P<c>1|%)?(?P<d>[mu])?(?:sr|steradian)\^?-1|(?:inverse|inv)(?P<e>[mu])?(?:sr|steradians?)"
+    r"(?:(?P<one>1|%)?/|per)(?P<over>[mu]|milli|micro)?(?:sr|steradians?)"
+    r"|(?P<share>1|%)?(?P<power>[mu])?(?:sr|steradian)\^?-1|(?:inverse|inv)(?P<inverse>[mu])?(?:sr|steradians?)"
 )
 _SIGNAL = re.compile(r"(?P<prefix>[kmunp]?)(?P<base>v|volts?|a|amps?|amperes?)")
 _POWER = re.compile(r"[kmunp]?w(?:att)?s?(?:[/*·^( -].*|m\^?-?2.*|sr.*)?|cd(?:/m\^?2|m\^?-2)|lx|lux|nits?")
@@ -97,7 +88,7 @@ _POWER = re.compile(r"[kmunp]?w(?:att)?s?(?:[/*·^( -].*|m\^?-?2.*|sr.*)?|cd(?:/
 def plain_text(text: str) -> str:
     """Text with Greek letters, superscripts, subscripts and the kinds of minus and micro spelt in ASCII."""
     text = unicodedata.normalize("NFKC", text.replace("ᵢ", "i"))
-    for letter, name in _GREEK.items():
+    for letter, name in _SPELT.items():
         text = text.replace(letter, name)
     return re.sub("[−–]", "-", text).strip()
 
@@ -112,9 +103,9 @@ def parse_unit(text: str) -> Unit | None:
         return _UNITS[key]
     match = _PER_SOLID_ANGLE.fullmatch(key)
     if match:
-        word = match["b"] or match["d"] or match["e"] or ""
+        word = match["over"] or match["power"] or match["inverse"] or ""
         prefix = "u" if word == "micro" else word[:1]
-        share = "%" if "%" in (match["a"], match["c"]) else "1"
+        share = "%" if "%" in (match["one"], match["share"]) else "1"
         factor = (0.01 if share == "%" else 1.0) / _PREFIXES[prefix]
         return Unit(f"{share}/{'µ' if prefix == 'u' else prefix}sr", "per steradian", factor)
     match = _SIGNAL.fullmatch(key)
