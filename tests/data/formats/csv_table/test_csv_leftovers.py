@@ -197,3 +197,10 @@ def test_names_of_angles_of_public_files(text_file, variable, name):
     names = {"theta_i": "theta_i", "theta_r": "theta_r", "phi": "phi", variable: name}
     ds = read(text_file(f"{STATED}{','.join(names.values())},I\n10,20,30,1\n"))
     assert_allclose(np.rad2deg([ds[v][0] for v in names]), [10, 20, 30])
+
+
+def test_a_table_without_values_is_told_how_to_name_them(text_file):
+    with pytest.raises(
+        DataError, match=r"no column holds values; name one, .*column=\{'I': …\}.* theta_i, theta_r, L_o"
+    ):
+        read(text_file(f"{STATED}theta_i,theta_r,L_o\n30,20,1\n"))

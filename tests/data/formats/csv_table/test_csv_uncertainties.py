@@ -58,6 +58,9 @@ def test_the_columns_of_the_case_c1(text_file):
         ("stdev", "0.003"),
         ("standard uncertainty", "0.003"),
         ("unc (1/msr)", "3e-6"),
+        ("brdf_unc_k2", "0.006"),
+        ("BRDF U(k=2)", "0.006"),
+        ("BRDF error (k=2)", "0.006"),
     ],
 )
 def test_other_kinds_become_standard_ones(text_file, name, value):
@@ -81,7 +84,17 @@ def test_an_uncertainty_without_a_unit_has_that_of_its_values(text_file):
 
 
 @pytest.mark.parametrize(
-    "name", ["expanded uncertainty", "U95", "U(I)", "U_rel (%)", "I expanded uncertainty (95 %)"]
+    "name",
+    [
+        "expanded uncertainty",
+        "U95",
+        "U(I)",
+        "BRDF_U95",
+        "BRDF U",
+        "U (95 %)",
+        "U_rel (%)",
+        "I expanded uncertainty (95 %)",
+    ],
 )
 def test_an_expanded_uncertainty_without_its_factor_is_asked_about(text_file, name):
     path = text_file(f"{STATED}theta_i,theta_r,phi,BRDF,{name}\n30,20,0,0.3,0.006\n")
@@ -202,3 +215,9 @@ def test_names_of_any_length_are_read_in_no_time(text_file):
         )
     )
     assert ds.attrs["ignored_columns"] == names
+
+
+@pytest.mark.parametrize("name", ["u(R)", "R_err", "sigma_R", "dR", "u_R", "U(R) (k=1)", "R uncertainty"])
+def test_uncertainties_of_a_reflectance_factor_called_r(text_file, name):
+    ds = read(text_file(f"# azimuth: forward=0\ntheta_i,theta_r,phi,R,{name}\n30,20,0,0.9,0.02\n"))
+    assert_allclose(ds["I_std"], [0.02])

@@ -252,3 +252,11 @@ def test_a_stated_unit_counts_before_the_file(text_file):
         read(path, unit={"theta_i": "grad"})
     with pytest.raises(DataError, match="there is no such column; the columns are"):
         read(path, unit={"dolp": "%"})
+
+
+def test_values_in_arbitrary_units_have_an_arbitrary_scale(text_file):
+    ds = read(text_file(f"{STATED}theta_i,theta_r,phi,BRDF (a.u.)\n30,20,0,7\n"))
+    assert [float(ds["I"][0]), ds.attrs["quantity"], ds.attrs["scale"]] == [7.0, "brdf", "arbitrary"]
+    assert "scale" not in read(text_file(f"{STATED}theta_i,theta_r,phi,BRDF (1/sr)\n30,20,0,7\n")).attrs
+    stated = read(text_file(f"{STATED}theta_i,theta_r,phi,BRDF (a.u.)\n30,20,0,7\n"), scale="absolute")
+    assert stated.attrs["scale"] == "absolute"

@@ -62,6 +62,11 @@ def to_dataset(
     assumptions = [*_directions(table, header, columns, values), *assumed, *read.assumptions]
 
     channels = {name: values[name] for name in CHANNELS if name in values}
+    if not channels:
+        raise DataError(
+            f"{table.path}: no column holds values; name one, for example with column={{'I': …}}. The columns are "
+            f"{', '.join(table.names)}"
+        )
     std = {name: values[std_name(name)] for name in CHANNELS if std_name(name) in values}
     channels, std = _gather_mueller(channels), _gather_mueller(std)
     covariance = _gather_covariance(values)
@@ -88,6 +93,8 @@ def to_dataset(
     if assumptions:
         extra["assumptions"] = assumptions
     coordinates = {name: values.get(name) for name in ("theta_i", "theta_r", "phi", "wavelength", "group")}
+    if read.scale is not None:
+        extra.setdefault("scale", header.attrs.get("scale", read.scale))
     attrs = {
         **header.attrs,
         "quantity": read.quantity,

@@ -137,7 +137,7 @@ _FILLERS = frozenset(
     ("stokes", "parameter", "measured", "panel", "value", "values", "mean", "average", "avg")
 )
 _ELEMENT = re.compile(r"(?:m|mueller|mm)[ _]?[\[({]?(\d)[\])},;\s_]*[\[({]?(\d)[\])}]?")
-_DIFFERENTIAL = re.compile(r"d_?([IQUV]|S[0-3]|BRDF|brdf|DoLP|dolp|DOLP|AoLP|aolp)")
+_DIFFERENTIAL = re.compile(r"d_?([IQUVR]|S[0-3]|BRDF|brdf|DoLP|dolp|DOLP|AoLP|aolp)")
 _CODED = re.compile(r"(?:(u)|(U))_?(95|k\d)?")  # u or U, U95, U_k2
 
 
@@ -227,7 +227,7 @@ class _Parts:
             self.standard = True
         elif lowered == "expanded":
             self.expanded = True
-        elif _variable(lowered) and parse_unit(text) is None:
+        elif _is_owner(text) and parse_unit(text) is None:
             self.inner = text
         elif lowered:
             self.unit = text
@@ -297,6 +297,8 @@ def parse_name(name: str) -> Name:
     variable, elevation = _variable(key), False
     if variable is None and key in _ELEVATIONS:
         variable, elevation = _ELEVATIONS[key], True
+    if key == "azimuth" and parts.relative:
+        variable = "phi"
     quantity = _QUANTITY_OF.get(key)
     if variable is None and key == "r" and (words[-1:] == ["R"] or parts.unit):
         variable = "I"
@@ -369,6 +371,9 @@ def _uncertainty(words: list[str], parts: _Parts) -> tuple[str | None, list[str]
     if glued:
         return _kind(parts, "standard"), [glued[2]]
     signs = [word for word in lowered if word in _STANDARD]
+    if len(words) > 1 and re.fullmatch("U(95)?", words[-1]) and _is_owner("".join(words[:-1])):
+        parts.expanded = parts.coverage != 1.0
+        return _kind(parts, "standard"), words[:-1]
     if "standard" in lowered and {"deviation", "dev", "error"} & set(lowered):
         signs.append("std")
     if "expanded" in lowered and (signs or len(lowered) == 1):
@@ -385,7 +390,7 @@ def _uncertainty(words: list[str], parts: _Parts) -> tuple[str | None, list[str]
     if words and (match := _CODED.fullmatch(words[0])):
         left = [w for w, low in zip(words[1:], lowered[1:], strict=True) if low not in _BESIDE | {"95", "c"}]
         said = match[3] or parts.expanded or parts.standard or parts.relative or len(left) < len(words) - 1
-        owner = bool(left) and _variable("".join(left)) is not None
+        owner = bool(left) and _is_owner("".join(left))
         if said or owner or parts.inner:
             if match[3] and match[3] != "95":
                 parts._covered(float(match[3][1:]))
@@ -399,9 +404,14 @@ def _uncertainty(words: list[str], parts: _Parts) -> tuple[str | None, list[str]
     if words and re.fullmatch(r"U[IQ]", words[0]) and len(words) == 1:
         parts.expanded = True
         return "expanded", [words[0][1]]
-    if parts.expanded and not signs and words and _variable("".join(words)) is None:
-        return "expanded", []
+    if parts.expanded and words:
+        return "expanded", [w for w, low in zip(words, lowered, strict=True) if low not in ("u", "u95")]
     return None, words
+
+
+def _is_owner(text: str) -> bool:
+    """Whether an uncertainty may be that of a variable of this name."""
+    return text == "R" or _variable(text) is not None
 
 
 def _kind(parts: _Parts, otherwise: str) -> str:

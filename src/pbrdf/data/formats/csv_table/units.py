@@ -99,8 +99,9 @@ def parse_unit(text: str) -> Unit | None:
     key = re.sub(r"\((-\d|m?sr)\)", r"\1", key)
     if key.startswith("(") and key.endswith(")"):
         key = key[1:-1]
-    if key in _UNITS:
-        return _UNITS[key]
+    found = _UNITS.get(key) or _UNITS.get(key.rstrip("."))
+    if found is not None:
+        return found
     match = _PER_SOLID_ANGLE.fullmatch(key)
     if match:
         word = match["over"] or match["power"] or match["inverse"] or ""

@@ -47,6 +47,8 @@ class Values:
         Sentences on values that look wrong.
     assumptions
         Sentences on what was assumed of the values.
+    scale
+        ``"arbitrary"`` where the values have arbitrary units; None where they say nothing.
     """
 
     arrays: dict[str, NDArray[Any]]
@@ -54,6 +56,7 @@ class Values:
     meanings: dict[str, str]
     remarks: list[str]
     assumptions: list[str]
+    scale: str | None = None
 
 
 def values_of(table: Table, columns: Sequence[Column], header: Header, angles: str | None = None) -> Values:
@@ -89,6 +92,7 @@ class _Conversion:
         #: Factor from the file's unit of each channel to the data set's.
         self.factors: dict[str, float] = {}
         self.arrays: dict[str, NDArray[Any]] = {}
+        self.scale: str | None = None
 
     def values(self) -> Values:
         self.quantity = self._quantity()
@@ -114,7 +118,7 @@ class _Conversion:
             elif variable.endswith("_std") and variable not in self.arrays:
                 self.arrays[variable] = self._uncertainty(column)
         arrays = {v: self.arrays[v] for v in [*self.columns, "phi"] if v in self.arrays}
-        return Values(arrays, self.quantity, self.meanings, self.remarks, self.assumptions)
+        return Values(arrays, self.quantity, self.meanings, self.remarks, self.assumptions, self.scale)
 
     def _numbers(self, column: Column) -> NDArray[np.float64]:
         if column.index is not None:
@@ -285,6 +289,11 @@ class _Conversion:
 
     def _radiometric(self, column: Column) -> tuple[float, str]:
         """Factor to the unit of the quantity, and the unit in words."""
+        if self.quantity in ("brdf", "reflectance_factor") and parse_unit(column.unit or "") == parse_unit(
+            "a.u."
+        ):
+            self.scale = "arbitrary"
+            return 1.0, " (a.u.)"
         if self.quantity == "brdf":
             unit = self._unit(
                 column, ("per steradian",), "1/sr or 1/msr for a BRDF (% is that of a reflectance factor)"
