@@ -16,6 +16,7 @@ __all__ = [
     "require_no_lost_azimuth",
     "require_one_illumination",
     "require_one_polarization",
+    "texts_of",
 ]
 
 _AZIMUTH = re.compile(r"(?<![a-z])phi(?![a-z]{2})|azim")
@@ -35,7 +36,12 @@ _SHOWN = 5
 
 def distinct(table: Table, column: int) -> list[str]:
     """The different texts of a column, in the order of the file."""
-    return list(dict.fromkeys(row[column] for row in table.rows))
+    return list(dict.fromkeys(texts_of(table, column)))
+
+
+def texts_of(table: Table, column: int) -> list[str]:
+    """What the cells of a column hold."""
+    return [row[column] for row in table.rows]
 
 
 def require_no_lost_azimuth(

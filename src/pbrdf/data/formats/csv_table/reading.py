@@ -12,6 +12,7 @@ from pbrdf.data.formats.csv_table.assembly import to_dataset
 from pbrdf.data.formats.csv_table.columns import Resolved, resolve_columns
 from pbrdf.data.formats.csv_table.header import Header, statements
 from pbrdf.data.formats.csv_table.hints import comment_units
+from pbrdf.data.formats.csv_table.leftovers import texts_of
 from pbrdf.data.formats.csv_table.names import AZIMUTHS, parse_name
 from pbrdf.data.formats.csv_table.values import Values, values_of
 from pbrdf.data.formats.csv_table.wide import long_table
@@ -119,7 +120,7 @@ def _origin(
         if widened.get(name, name):
             meanings.append((widened.get(name, name), meaning))
     unused = {
-        table.names[index]: tuple(row[index] for row in table.rows)
+        table.names[index]: tuple(texts_of(table, index))
         for index in resolved.unused
         if table.names[index] not in ignore and parse_name(table.names[index]).uncertainty is None
     }
