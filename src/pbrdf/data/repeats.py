@@ -15,12 +15,13 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from pbrdf.data.schema import VARIABLES, std_name
+from pbrdf.optics.stokes import STOKES
 
 __all__ = ["Repeats", "find_repeats", "separating_column"]
 
 #: How many standard uncertainties of their difference two values may lie apart.
 DEVIATIONS = 5.0
-#: Share of the intensity by which they may differ where no uncertainty is stated.
+#: Share of the intensity by which they may differ where no uncertainty is stated, or that of a ratio.
 SHARE = 0.1
 
 
@@ -111,9 +112,8 @@ def _disagreeing(
         deviation = _largest(ds[std_name(name)].values[rows].reshape(len(rows), -1), number)
     else:
         deviation = np.full(spread.shape, np.nan)
-    if name == "dolp":
-        scale = np.ones_like(spread)
-    else:
+    scale = np.ones_like(spread)
+    if name == "mueller" or (name in STOKES and "I" in ds):
         whole = ds["mueller"].values[rows][:, :1, 0] if name == "mueller" else ds["I"].values[rows][:, None]
         scale = np.broadcast_to(_largest(np.abs(whole), number), spread.shape)
     with np.errstate(invalid="ignore", over="ignore"):

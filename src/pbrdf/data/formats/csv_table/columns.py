@@ -222,7 +222,7 @@ class _Resolution:
     def _is_no_stokes(self, name: Name, names: Mapping[int, Name]) -> bool:
         """Whether u, U, v or V is not taken for a Stokes parameter: a coordinate, an uncertainty, a voltage."""
         text = _bare(name)
-        if name.uncertainty or text not in ("u", "v", "U", "V"):
+        if name.variable not in ("U", "V") or name.uncertainty or text not in ("u", "v", "U", "V"):
             return False
         others = {_bare(n) for n in names.values()} | self.columns.keys()
         if any(n.variable == "Q" and not n.uncertainty for n in names.values()) or "Q" in self.columns:
