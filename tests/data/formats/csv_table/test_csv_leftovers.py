@@ -90,17 +90,18 @@ def test_ignoring_a_column(text_file):
 
 
 def test_states_of_polarisation_are_read_one_at_a_time(text_file):
-    path = text_file(f"{STATED}theta_i,theta_r,phi,I,pol\n30,20,0,0.3,s\n30,20,0,0.4,p\n")
+    path = text_file(f"{STATED}theta_i,theta_r,phi,I,polarization\n30,20,0,0.3,s\n30,20,0,0.4,p\n")
     with pytest.raises(
-        DataError, match=r"where=\{'pol': 's'\} and illumination='1,-1,0,0', or with where=\{'pol': 'p'\}"
+        DataError,
+        match=r"where=\{'polarization': 's'\} and illumination='1,-1,0,0', or with where=\{'polarization': 'p'\}",
     ):
         read(path)
     with pytest.raises(DataError, match="read it with illumination='1,1,0,0'"):
-        read(path, where={"pol": "p"})
-    ds = read(path, where={"pol": "p"}, illumination="1,1,0,0")
+        read(path, where={"polarization": "p"})
+    ds = read(path, where={"polarization": "p"}, illumination="1,1,0,0")
     assert_array_equal(ds["I"], [0.4])
     assert check(ds) == []
-    assert read(path, ignore=["pol"]).sizes["geometry"] == 2
+    assert read(path, ignore=["polarization"]).sizes["geometry"] == 2
 
 
 def test_columns_for_s_and_p_are_read_one_at_a_time(text_file):

@@ -64,7 +64,7 @@ def test_what_the_columns_were_taken_for(text_file):
     [
         ("390nm,400nm", "1,x", "line 2, column '400nm': 'x' is not a number"),
         ("400nm,400 nm", "1,2", "the columns '400nm' and '400 nm' are both 400 nm"),
-        ("I_390,I_400,Q_390,Q_410", "1,1,1,1", "do not go together.* differ at 400 nm"),
+        ("BRDF_390,BRDF_400,DoLP_390,DoLP_410", "1,1,1,1", "do not go together.* differ at 400 nm"),
     ],
 )
 def test_columns_of_wavelengths_that_are_not_clear(text_file, names, row, words):
