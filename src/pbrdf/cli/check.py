@@ -21,13 +21,15 @@ def check(
     The exit code is 2 if the file cannot be used as it stands.
     """
     from pbrdf.data import check as issues_of
-    from pbrdf.report.dataset.describe import describe
+    from pbrdf.report.dataset.describe import columns_in_words, describe, on_the_command_line
 
-    dataset = reading.open(file)
+    dataset = reading.open(file, say=False)
     for line in describe(dataset):
         print(line)
+    for i, line in enumerate(columns_in_words(dataset)):
+        print(line if i else f"columns: {line}")
     issues = issues_of(dataset)
     for issue in issues:
-        print(f"{issue.severity}: {issue}")
+        print(f"{issue.severity}: {on_the_command_line(str(issue))}")
     if not issues:
         print("Nothing is wrong with it.")

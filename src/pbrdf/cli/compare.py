@@ -18,7 +18,8 @@ from pbrdf.cli.options import (
     seed_option,
     with_reading_options,
 )
-from pbrdf.cli.reading import Reading
+from pbrdf.cli.reading import Reading, print_columns
+from pbrdf.cli.wavelengths import require_choice
 from pbrdf.errors import FitError, PbrdfError
 
 __all__ = ["compare"]
@@ -119,6 +120,7 @@ def compare(
     from pbrdf.report.comparison.summary import print_summary
 
     dataset = reading.open(file)
+    require_choice(dataset, reading, file)
     arguments: dict[str, Any] = {
         "hold_out": hold_out,
         "by": by,
@@ -141,6 +143,7 @@ def compare(
         print(folder)
     else:
         console = output_console()
+        print_columns(dataset, file)
         print_summary(report, console)
         console.print(f"\nWritten to {folder}/: {', '.join(path.name for path in written)}", markup=False)
     if not comparison.best.result.settled:

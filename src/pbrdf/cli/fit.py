@@ -22,6 +22,7 @@ from pbrdf.cli.options import (
 from pbrdf.cli.reading import Reading
 from pbrdf.cli.values import bounds as read_bounds
 from pbrdf.cli.values import numbers, pairs
+from pbrdf.cli.wavelengths import require_choice
 from pbrdf.errors import FitError, PbrdfError
 
 if TYPE_CHECKING:
@@ -222,6 +223,7 @@ def fit(
     unsettled = False
     for file, folder in zip(files, folders, strict=True):
         dataset = reading.open(file)
+        require_choice(dataset, reading, file, by_wavelength="wavelength" in arguments["split"].values())
         try:
             with stage_bar(quiet, f"Fitting {file}") as show:
                 progress = functools.partial(show, f"Fitting {file}")

@@ -157,6 +157,18 @@ _READING: dict[str, tuple[Any, Any]] = {
         ),
         None,
     ),
+    "unit": (
+        _reading_option(
+            list[str] | None,
+            "Unit of a column, e.g. I=%, theta_i=mrad or dolp=% (repeatable).",
+            metavar="NAME=UNIT",
+        ),
+        None,
+    ),
+    "ignore": (
+        _reading_option(list[str] | None, "Leave out a column of the file (repeatable).", metavar="COLUMN"),
+        None,
+    ),
     "where": (
         _reading_option(
             list[str] | None, "Take only rows with this text in a column (repeatable).", metavar="COLUMN=TEXT"
@@ -215,6 +227,19 @@ _READING: dict[str, tuple[Any, Any]] = {
         None,
     ),
     "angles": (_reading_option(str | None, "Unit of the file's angles: degrees or radians."), None),
+    "coverage": (
+        _reading_option(
+            float | None, "Coverage factor of expanded uncertainties that do not state it.", metavar="K"
+        ),
+        None,
+    ),
+    "scale": (
+        _reading_option(
+            str | None,
+            "Whether an unknown constant factor is left in the values: arbitrary or absolute.",
+        ),
+        None,
+    ),
     "every": (
         Annotated[
             int | None,
@@ -260,7 +285,7 @@ def with_reading_options(command: Callable[..., None]) -> Callable[..., None]:
     @functools.wraps(command)
     def run(**given: Any) -> None:
         options = {name: given.pop(name) for name in _READING}
-        for name in ("column", "where", "analyzer", "select", "wavelength"):
+        for name in ("column", "unit", "ignore", "where", "analyzer", "select", "wavelength"):
             options[name] = list(options[name] or ())
         command(reading=Reading(**options), **given)
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from pbrdf.cli.console import output_console, warn
 from pbrdf.cli.values import number, pairs
 from pbrdf.errors import DataError, PbrdfError
 
@@ -14,10 +14,11 @@ if TYPE_CHECKING:
     import numpy as np
     import xarray as xr
 
-__all__ = ["SELECTABLE", "Reading"]
+__all__ = ["SELECTABLE", "Reading", "print_columns"]
 
 #: What geometries can be selected by.
 SELECTABLE = ("group", "theta_i", "theta_r", "phi", "wavelength")
+_SCALES = ("arbitrary", "absolute")
 #: Half the width within which a value that was asked for meets a measured one, degrees and nm.
 _TOLERANCE = {"wavelength": 0.5}
 _ANGLE_TOLERANCE = 0.05
@@ -29,15 +30,21 @@ class Reading:
 
     Attributes
     ----------
-    format, quantity, azimuth, stokes, illumination, cosine_weighted, angles, skip_invalid, every, sheet
+    format, quantity, azimuth, stokes, illumination, cosine_weighted, angles, coverage, scale
+        As in :func:`pbrdf.read`; None where not given.
+    skip_invalid, every, sheet
         As in :func:`pbrdf.read`; None and False where not given.
-    column, where, analyzer, select
+    column, unit, where, analyzer, select
         Texts ``NAME=VALUE``.
+    ignore
+        Names of columns.
     wavelength
         Wavelengths in nm.
     """
 
     column: list[str]
+    unit: list[str]
+    ignore: list[str]
     where: list[str]
     analyzer: list[str]
     select: list[str]
@@ -50,6 +57,8 @@ class Reading:
     illumination: str | None
     cosine_weighted: bool | None
     angles: str | None
+    coverage: float | None
+    scale: str | None
     every: int | None
     sheet: str | None
 
@@ -61,13 +70,15 @@ class Reading:
             if getattr(self, f.name) not in (None, [], False)
         }
 
-    def open(self, source: str) -> xr.Dataset:
+    def open(self, source: str, *, say: bool = True) -> xr.Dataset:
         """Read a file, or a bundled paint's experiment if no file has that name.
 
         Parameters
         ----------
         source
             Path or name.
+        say
+            Whether a column that should perhaps not be left out is named on standard error.
 
         Raises
         ------
@@ -75,13 +86,20 @@ class Reading:
             If there is neither, the file cannot be understood, or nothing is left of it.
         """
         from pbrdf.data import read
+        from pbrdf.data.origin import origin_of
         from pbrdf.data.paints import PAINTS, open_experiment
+        from pbrdf.report.dataset.describe import on_the_command_line
 
+        if self.scale not in (None, *_SCALES):
+            raise PbrdfError(f"--scale {self.scale!r}: choose {' or '.join(_SCALES)}")
         options = {
-            name: value for name, value in self.stated().items() if name not in ("select", "wavelength")
+            name: value
+            for name, value in self.stated().items()
+            if name not in ("select", "wavelength", "scale")
         }
         for name, example in (
             ("column", "I=f_r_per_sr"),
+            ("unit", "I=%"),
             ("where", "material=white"),
             ("analyzer", "zero=s"),
         ):
@@ -91,7 +109,7 @@ class Reading:
             try:
                 dataset = read(source, **options)
             except DataError as error:
-                raise DataError(_as_on_the_command_line(str(error))) from error
+                raise DataError(on_the_command_line(str(error))) from error
         elif source in PAINTS:
             if options:
                 given = ", ".join("--" + name.replace("_", "-") for name in options)
@@ -100,8 +118,13 @@ class Reading:
         else:
             names = f", and no bundled paint has that name; those are {', '.join(PAINTS)}"
             raise DataError(f"{source}: there is no such file{'' if Path(source).suffix else names}")
+        if self.scale is not None:
+            dataset.attrs["scale"] = self.scale
         for wanted in self._selections():
             dataset = _selected(dataset, *wanted, source)
+        origin = origin_of(dataset)
+        for sentence in origin.remarks if say and origin else ():
+            warn(f"{source}: {on_the_command_line(sentence)}")
         return dataset
 
     def _selections(self) -> list[tuple[str, str]]:
@@ -111,16 +134,20 @@ class Reading:
         return selections
 
 
-def _as_on_the_command_line(message: str) -> str:
-    """Turn the advice to use Python's argument ``column`` into advice to use the option."""
-    return re.sub(
-        r"column=\{'(\w+)': ('[^']*'|…)\}", lambda m: f"--column {m[1]}={m[2].strip(chr(39))}", message
-    )
+def print_columns(dataset: xr.Dataset, source: str) -> None:
+    """Print what each column of a table was taken for, and which were not used."""
+    from pbrdf.report.dataset.describe import columns_in_words
+
+    console = output_console()
+    for i, line in enumerate(columns_in_words(dataset)):
+        console.print(f"Columns of {source}: {line}" if i == 0 else line, markup=False)
 
 
 def _selected(dataset: xr.Dataset, kind: str, text: str, source: str) -> xr.Dataset:
     """The geometries with these values (``10,20``) or in this range (``0:80``) of a coordinate."""
     import numpy as np
+
+    from pbrdf.data.origin import of_rows
 
     if kind not in SELECTABLE:
         raise PbrdfError(f"--select: select by {', '.join(SELECTABLE)}, not by {kind!r}")
@@ -137,7 +164,7 @@ def _selected(dataset: xr.Dataset, kind: str, text: str, source: str) -> xr.Data
     if not keep.any():
         shown = ", ".join(available[:20]) + (" …" if len(available) > 20 else "")
         raise DataError(f"{source}: nothing has {kind}={text}; there are {shown}")
-    return dataset.isel(geometry=keep)
+    return of_rows(dataset, keep, dataset.isel(geometry=keep))
 
 
 def _within(values: np.ndarray, text: str, kind: str) -> np.ndarray:

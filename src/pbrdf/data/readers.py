@@ -118,8 +118,9 @@ def read(
     **options
         Options of the format's reader: for ``"csv"`` those of :func:`pbrdf.data.formats.csv_table.reading.read_csv`
         (`where`, `skip_invalid`, `quantity`, `azimuth`, `stokes`, `illumination`, `cosine_weighted`,
-        `angles`, `sheet`); for formats with wavelengths of their own `wavelength` in nm, one or several; for those of
-        tables over a grid of angles `every`, see :func:`pbrdf.data.formats.pbsdf.read_pbsdf`.
+        `angles`, `unit`, `coverage`, `scale`, `ignore`, `sheet`); for formats with wavelengths of their own
+        `wavelength` in nm, one or several; for those of tables over a grid of angles `every`, see
+        :func:`pbrdf.data.formats.pbsdf.read_pbsdf`.
 
     Returns
     -------

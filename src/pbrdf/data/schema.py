@@ -56,7 +56,8 @@ Attributes
     ``title``, ``source``, ``reference``, ``instrument`` (optional)
         Free text.
     ``scale`` (optional)
-        ``"arbitrary"`` where an unknown constant factor is left in the values.
+        ``"arbitrary"`` where an unknown constant factor is left in the values, ``"absolute"`` where none is (which is
+        taken for granted of a BRDF or a reflectance factor, and not of radiances and digital numbers).
     ``assumptions`` (optional)
         Sentences: what a reader assumed because the file did not say.
     ``readings`` (optional)
@@ -127,7 +128,7 @@ ANGLES = ("theta_i", "theta_r", "phi", "aolp", "aolp_std")
 TEXT_ATTRIBUTES = ("title", "source", "reference", "instrument")
 
 #: Header keys by which a CSV file states its own conventions; no attribute may have these names.
-FILE_KEYS = ("azimuth", "stokes", "cosine_weighted", "angles")
+FILE_KEYS = ("azimuth", "stokes", "cosine_weighted", "angles", "coverage")
 
 #: What an attribute may be called, so that every file format can hold it.
 ATTRIBUTE_NAME = r"[A-Za-z_][A-Za-z0-9_.-]*"

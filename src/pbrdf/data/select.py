@@ -31,8 +31,9 @@ def to_brdf_scale(ds: xr.Dataset) -> xr.Dataset:
     """The same data as a BRDF, uncertainties and covariances included.
 
     A reflectance factor is divided by π, radiance and digital numbers by cos θ_i. The unknown factor of the
-    last two stays in the values, which the attribute ``scale = "arbitrary"`` records. Ratios (degree and angle of
-    polarisation, what is divided by I or m00) are not touched; data of ratios alone keep their quantity.
+    last two stays in the values, which the attribute ``scale = "arbitrary"`` records unless they state ``"absolute"``.
+    Ratios (degree and angle of polarisation, what is divided by I or m00) are not touched; data of ratios alone keep
+    their quantity.
 
     Parameters
     ----------
@@ -70,7 +71,7 @@ def to_brdf_scale(ds: xr.Dataset) -> xr.Dataset:
         put(COVARIANCE, covariance)
     result.attrs["quantity"] = "brdf"
     if quantity in ("radiance", "dn"):
-        result.attrs["scale"] = "arbitrary"
+        result.attrs.setdefault("scale", "arbitrary")
     return result
 
 

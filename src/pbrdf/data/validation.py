@@ -19,6 +19,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from pbrdf.data.covariance import covariance_problems
+from pbrdf.data.origin import origin_of
+from pbrdf.data.repeats import find_repeats, separating_column
 from pbrdf.data.schema import (
     ATTRIBUTE_NAME,
     COORDINATES,
@@ -110,24 +112,41 @@ def check(
     ds
         The data set.
     lines
-        Number of the file's line that each row came from, for messages; None names rows by their index
-        along ``geometry``, from 0.
+        Number of the file's line that each row came from, for messages; None asks the data set's origin
+        (:mod:`pbrdf.data.origin`) and, where it knows none, names rows by their index along ``geometry``, from 0.
     columns
-        The file's column names by variable, for messages.
+        The file's column names by variable, for messages; None asks the data set's origin.
 
     Returns
     -------
     list of Issue
         Errors first; empty if there is nothing to say.
     """
-    labels = _Labels(lines, columns or {})
+    labels = _labels(ds, lines, columns)
+    issues = _judged(ds, labels)
+    origin = origin_of(ds)
+    issues += [_warning("", sentence) for sentence in (origin.remarks if origin else ())]
+    if not any(issue.severity == "error" for issue in issues):
+        issues += _repeats(ds, labels)
+    return sorted(issues, key=lambda issue: issue.severity != "error")
+
+
+def _labels(ds: xr.Dataset, lines: Sequence[int] | None, columns: Mapping[str, str] | None) -> _Labels:
+    origin = origin_of(ds)
+    if origin is not None:
+        lines = origin.lines or None if lines is None else lines
+        columns = origin.columns if columns is None else columns
+    return _Labels(lines, columns or {})
+
+
+def _judged(ds: xr.Dataset, labels: _Labels) -> list[Issue]:
     issues = [*_attributes(ds), *_structure(ds)]
     # Values can only be judged where the arrays have the right shape and type.
     if not any(issue.severity == "error" for issue in issues):
         issues += [*_angles(ds, labels), *_groups(ds, labels), *_values(ds, labels), *_physics(ds, labels)]
         if COVARIANCE in ds.data_vars:
             issues += _covariance(ds, labels)
-    return sorted(issues, key=lambda issue: issue.severity != "error")
+    return issues
 
 
 def validate(
@@ -153,7 +172,7 @@ def validate(
     DataError
         Lists every error, one per line.
     """
-    errors = [issue for issue in check(ds, lines=lines, columns=columns) if issue.severity == "error"]
+    errors = [issue for issue in _judged(ds, _labels(ds, lines, columns)) if issue.severity == "error"]
     if errors:
         raise DataError(f"{origin} does not follow the schema: {'; '.join(map(str, errors))}")
 
@@ -374,6 +393,8 @@ def _values(ds: xr.Dataset, labels: _Labels) -> Iterator[Issue]:
         if name in VARIABLES:
             measured |= np.any(~np.isnan(values), axis=1)
         elif name != COVARIANCE:
+            if name.endswith("_std") and COVARIANCE not in ds.data_vars:
+                yield from _unstated(ds, name, labels)
             bad = np.flatnonzero(np.any(values <= 0, axis=1))
             if bad.size:
                 what = "a wavelength" if name == "wavelength" else "a standard uncertainty"
@@ -389,9 +410,59 @@ def _values(ds: xr.Dataset, labels: _Labels) -> Iterator[Issue]:
         yield _warning("", f"{labels.rows(empty)}: nothing was measured there; drop the row", empty)
 
 
+def _unstated(ds: xr.Dataset, name: str, labels: _Labels) -> Iterator[Issue]:
+    """Values without a stated uncertainty beside others that have one."""
+    rows = ds.sizes[DIMENSION]
+    values = ds[name.removesuffix("_std")].values.reshape(rows, -1)
+    unknown = np.isnan(ds[name].values.reshape(rows, -1))
+    # an element or channel of which no uncertainty is known at all is another matter
+    without = np.flatnonzero(np.any(unknown & ~np.isnan(values) & ~unknown.all(axis=0), axis=1))
+    if without.size:
+        yield _warning(
+            name,
+            f"{labels.variable(name)}, {labels.rows(without)}: no uncertainty is stated, though others "
+            "are; a fit by the "
+            "stated uncertainties leaves the value out",
+            without,
+        )
+
+
 def _covariance(ds: xr.Dataset, labels: _Labels) -> Iterator[Issue]:
     for words, bad in covariance_problems(ds):
         yield _error(COVARIANCE, f"{COVARIANCE}, {labels.rows(bad)}: {words}", bad)
+
+
+def _repeats(ds: xr.Dataset, labels: _Labels) -> Iterator[Issue]:
+    found = find_repeats(ds)
+    if found.copies.size:
+        count = found.copies.size
+        yield _warning(
+            "",
+            f"{count} row{'s are exact copies' if count > 1 else ' is an exact copy'} of others "
+            f"({labels.rows(found.copies[:1])} of {labels.rows(found.originals[:1])}); each counts as one more "
+            "measurement and makes the errors of a fit too small: leave them out",
+            found.copies,
+        )
+    if found.disagreeing.size:
+        origin = origin_of(ds)
+        separating = separating_column(found, origin.unused) if origin and origin.unused else None
+        advice = "two samples in one file are told apart by group"
+        if separating is not None:
+            name, values = separating
+            shown = ", ".join(values[:_ROWS_NAMED]) + (" …" if len(values) > _ROWS_NAMED else "")
+            advice = (
+                f"the column {name!r} ({shown}) tells them apart: take one with where={{{name!r}: {values[0]!r}}}, or "
+                f"keep them apart with column={{'group': {name!r}}}"
+            )
+        sets = len(np.unique(found.sets))
+        one = found.disagreeing[found.sets == found.sets[0]]
+        yield _warning(
+            "",
+            f"{sets} {'geometries were' if sets > 1 else 'geometry was'} measured more than once with "
+            "values that disagree "
+            f"({labels.rows(one)}); {advice}",
+            found.disagreeing,
+        )
 
 
 def _physics(ds: xr.Dataset, labels: _Labels) -> Iterator[Issue]:
@@ -405,7 +476,8 @@ def _physics(ds: xr.Dataset, labels: _Labels) -> Iterator[Issue]:
             yield _warning(
                 name,
                 f"{labels.variable(name)}, {labels.rows(dark)}: {'m00' if mueller else 'I'} = "
-                f"{intensity[dark[0]]:.6g} is not positive",
+                f"{intensity[dark[0]]:.6g} is not positive, and a fit uses it as a measurement; leave the cell empty "
+                "if nothing was measured there",
                 dark,
             )
     divided = "the matrices" if mueller else ", ".join(n for n in ("Q", "U", "V") if n in ds)

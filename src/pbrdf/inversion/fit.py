@@ -145,7 +145,8 @@ def fit(
     if covariance is None:
         observations = Observations.from_dataset(dataset, noise, objective)
     else:
-        bare = Observations.from_dataset(dataset.drop_vars(COVARIANCE, errors="ignore"), None, objective)
+        stated = [COVARIANCE, *(name for name in map(str, dataset.data_vars) if name.endswith("_std"))]
+        bare = Observations.from_dataset(dataset.drop_vars(stated, errors="ignore"), None, objective)
         observations = bare.with_covariance(np.asarray(covariance))
     held = hold_out.mask(dataset, seed) if hold_out else np.zeros(observations.values.shape[1], dtype=bool)
     fitted_data = observations.subset(~held)
@@ -279,7 +280,8 @@ def _noise_in_words(noise: Noise | None, data: Observations) -> str:
         return f"stated: {noise}"
     if data.std_known:
         kind = "standard uncertainties" if data.correlation is None else "covariances"
-        return f"{kind} of the data set"
+        left_out = "" if data.unstated == 0 else f"; {data.unstated} values without one are left out"
+        return f"{kind} of the data set{left_out}"
     assumed = NoiseModel()
     words = str(assumed)
     if not {"I", "m00"} & set(data.channels):

@@ -32,6 +32,15 @@ def notes_on(
             )
     if not result.settled:
         notes.append(_not_converged(Status(solution.status[best])))
+    scale = dataset.attrs.get("scale")
+    unknown = scale == "arbitrary" or (
+        dataset.attrs["quantity"] in ("radiance", "dn") and scale != "absolute"
+    )
+    if unknown and not any(term.nuisance and term.role == "gain" for term in result.space.terms):
+        notes.append(
+            "The data are on an arbitrary scale and no gain was fitted: the height of the lobe, and what rests on it, "
+            "was compared with an absolute one; add the nuisance gain (--nuisance gain), or state --scale absolute."
+        )
     undetermined = [n for n, e in result.estimates.items() if e.verdict == "undetermined"]
     if undetermined:
         notes.append(

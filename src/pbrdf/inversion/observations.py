@@ -49,6 +49,8 @@ class Observations:
     correlation
         Correlation matrix of the errors of the channels at each geometry, shape (G, C, C); None where they are
         independent. Only entries between measured channels count.
+    unstated
+        How many values were left out as no uncertainty is stated of them, though of others of their channel.
     """
 
     theta_i: np.ndarray
@@ -63,6 +65,7 @@ class Observations:
     wavelength: np.ndarray | None = None
     scale: np.ndarray | None = None
     correlation: np.ndarray | None = None
+    unstated: int = 0
 
     @classmethod
     def from_dataset(
@@ -131,13 +134,18 @@ class Observations:
         model = noise or NoiseModel()
         if objective == "paper":
             columns, uncertainties = _intensity_and_dolp(columns)
-        known = True
+        known, unstated = True, 0
         channels = tuple(name for name in columns if np.isfinite(columns[name]).any())
         for name in channels:
             guess = model.standard_uncertainty(name, intensity, scale)
             given = np.isfinite(uncertainties[name]) & (noise is None or objective == "paper")
             finite = np.isfinite(columns[name])
-            known &= objective == "stokes" and (bool((given | ~finite).all()) or model.absolute_scale)
+            if noise is None and objective == "stokes" and (given & finite).any():
+                # a value without an uncertainty among others that have one is left out, not the others' uncertainties
+                columns[name] = np.where(given, columns[name], np.nan)
+                unstated += int((finite & ~given).sum())
+                continue
+            known &= objective == "stokes" and model.absolute_scale
             uncertainties[name] = np.where(given, uncertainties[name], guess)
         values = np.stack([columns[name] for name in channels])
         std = np.stack([uncertainties[name] for name in channels])
@@ -154,6 +162,7 @@ class Observations:
             group=ds["group"].values,
             wavelength=ds["wavelength"].values if "wavelength" in ds.coords else None,
             scale=scale,
+            unstated=unstated,
         )
         if noise is not None or objective == "paper":
             return result

@@ -117,8 +117,8 @@ def _energy(result: Optimum, attributes: dict[Any, Any]) -> Finding:
         sentence = f"{largest}, more than it receives, though only beyond the measured angles of incidence."
         return Finding("energy", Severity.WARNING, sentence)
     sentence = (
-        f"{largest}, more than it receives: the data are not an absolute BRDF (then set their attribute scale to "
-        '"arbitrary"), or the fit is wrong.'
+        f"{largest}, more than it receives: the data are not an absolute BRDF (then state --scale "
+        'arbitrary, or the attribute scale = "arbitrary"), or the fit is wrong.'
     )
     return Finding("energy", Severity.VIOLATION, sentence)
 
@@ -128,7 +128,7 @@ def _unknown_scale(attributes: dict[Any, Any]) -> str:
     quantity = attributes.get("quantity")
     if attributes.get("scale") == "arbitrary":
         return "the data are on an arbitrary scale"
-    if quantity in ("radiance", "dn"):
+    if quantity in ("radiance", "dn") and attributes.get("scale") != "absolute":
         kind = "digital numbers" if quantity == "dn" else "radiances"
         return f"the data are {kind}, proportional to the BRDF by an unknown factor"
     return ""

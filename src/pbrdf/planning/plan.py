@@ -283,7 +283,9 @@ def information(
     turned = angles.pop("reference_angle")
     blank = np.zeros((4, len(turned)))
     data = Observations(
-        **angles,
+        theta_i=angles["theta_i"],
+        theta_r=angles["theta_r"],
+        phi=angles["phi"],
         channels=STOKES,
         values=blank,
         std=blank + 1.0,

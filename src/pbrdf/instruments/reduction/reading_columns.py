@@ -16,6 +16,7 @@ from pbrdf.errors import DataError
 from pbrdf.instruments.reduction.reading_settings import Settings
 from pbrdf.instruments.reduction.reading_states import (
     DARK,
+    LONGEST,
     OPEN,
     ReadingName,
     State,
@@ -173,6 +174,8 @@ def holds_readings(names: Sequence[str], *, stated: bool = False) -> bool:
 
     Where the header states how readings were taken, any names are but those of Stokes parameters.
     """
+    if any(len(name) > LONGEST for name in names):
+        return False
     keys = {_key(name) for name in names if not split_uncertainty(name)[1]}
     if _STOKES & keys and not _horizontal_and_vertical(names):
         return False

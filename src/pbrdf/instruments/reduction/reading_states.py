@@ -32,6 +32,7 @@ from pbrdf.errors import DataError
 
 __all__ = [
     "DARK",
+    "LONGEST",
     "OPEN",
     "ReadingName",
     "State",
@@ -165,6 +166,10 @@ _BEFORE = re.compile(rf"({_DEVIATION}|u|δ|delta)[\s_.]+(.+)|(d|δ)([IL][\s_.(\[
 _AFTER = re.compile(rf"(.*?)[\s_.]+({_DEVIATION}|u)|(.*?)({_DEVIATION})", re.IGNORECASE)
 _COVERAGE = re.compile(r"[(\[,;]?\s*\bk\s*=\s*(\d+(?:\.\d+)?)\s*[)\]]?", re.IGNORECASE)
 _BRACKETS = re.compile(r"[(\[{]([^()\[\]{}]*)[)\]}]")
+#: Characters of the longest name that is looked into.
+LONGEST = 200
+#: A number above this many degrees is none of an angle, but a wavelength.
+_FULL_TURN = 360.0
 _TOKEN = re.compile(r"([+-]?\d+(?:\.\d+)?)|([^\W\d_]+|°)")
 
 
@@ -173,6 +178,8 @@ def split_uncertainty(name: str) -> tuple[str, bool, float | None]:
 
     A capital ``U`` alone is that of an expanded uncertainty; without its factor it counts as k = 2.
     """
+    if len(name) > LONGEST:
+        return name, False, None
     text = re.sub(r"\bf_r(?=[\W_]|$)", "fr", _clean(name))
     coverage = None
     if stated := _COVERAGE.search(text):
@@ -339,6 +346,8 @@ def _tokens(text: str) -> tuple[list[str | float], bool]:
             found.append(float(number))
         elif word.lower() not in _ANGLE_UNITS:
             found.append(word.lower())
+    if any(isinstance(part, float) and abs(part) > _FULL_TURN for part in found):
+        return [], hyphen
     # What stands there besides (a slash, an asterisk) is no name of a state.
     return ([] if re.search(r"[^\s_.,;:=+@()\[\]-]", rest) else found), hyphen
 

@@ -30,9 +30,10 @@ from pbrdf.data.build import assemble
 from pbrdf.data.formats.csv_table.header import statements
 from pbrdf.data.formats.csv_table.reading import read_rows, selected
 from pbrdf.data.formats.declaration import Reader
+from pbrdf.data.origin import of_rows, origin_of, remember
 from pbrdf.data.validation import validate
 from pbrdf.errors import DataError
-from pbrdf.files.delimited import Table, column_names, read_table
+from pbrdf.files.delimited import TABLE_EXTENSIONS, Table, column_names, read_table
 from pbrdf.files.text import first_bytes
 from pbrdf.instruments.reduction.reading_columns import (
     LongColumns,
@@ -73,6 +74,11 @@ def read_readings(
     illumination: str | Sequence[float] | None = None,
     cosine_weighted: bool | str | None = None,
     angles: str | None = None,
+    unit: Mapping[str, str] | None = None,
+    coverage: float | str | None = None,
+    scale: str | None = None,
+    ignore: Sequence[str] = (),
+    sheet: str | None = None,
     analyzer: Mapping[str, Any] | None = None,
 ) -> xr.Dataset:
     """Read a table of readings behind an analyser.
@@ -84,7 +90,7 @@ def read_readings(
     column
         As for a CSV table; also ``reading``, ``reading_std``, ``analyzer``, ``retarder``, ``retardance`` and ``state``
         of a table with a row for each reading.
-    where, skip_invalid, quantity, azimuth, illumination, cosine_weighted, angles
+    where, skip_invalid, quantity, azimuth, illumination, cosine_weighted, angles, unit, coverage, scale, ignore, sheet
         As for a CSV table, :func:`pbrdf.data.formats.csv_table.reading.read_csv`.
     stokes
         ``"s-p"`` where Q = I_s − I_p is meant: the analyser's 0 lies along s.
@@ -103,7 +109,7 @@ def read_readings(
         Names the file, the line and the column.
     """
     path = Path(path)
-    table = read_table(path)
+    table = read_table(path, sheet)
     table.require_rows()
     if where:
         table = selected(table, where)
@@ -148,6 +154,10 @@ def read_readings(
         illumination=illumination,
         cosine_weighted=cosine_weighted,
         angles=angles,
+        unit=unit,
+        coverage=coverage,
+        scale=scale,
+        ignore=ignore,
     )
     kept = rows[np.isin(np.asarray(table.lines)[rows], lines)]
     geometry, first = _geometries(ds)
@@ -197,10 +207,10 @@ def read_readings(
             "an analyser was taken to pass half of natural light, I = I0 + I90 (# analyzer_transmission: 1 where "
             "I = (I0 + I90)/2)"
         )
-    scale = ds["I"].values[first] * (
+    factor = ds["I"].values[first] * (
         0.01 if layout.unit == "%" and stated_quantity == "reflectance_factor" else 1.0
     )
-    vector, covariance = found.stokes * scale[:, None], found.covariance * scale[:, None, None] ** 2
+    vector, covariance = found.stokes * factor[:, None], found.covariance * factor[:, None, None] ** 2
     usable = ~np.isnan(vector[:, 0])
     assumptions += _incomplete(vector, usable, first_lines, names, path)
     assumptions += disagreements(found, first_lines, _sums(readings, names, len(first)))
@@ -230,10 +240,50 @@ def read_readings(
         attrs,
         covariance[usable] if not np.isnan(covariance[usable]).all() else None,
     )
+    _remember(result, ds, first[usable], table, layout, states, settings)
     validate(
         result, origin=str(path), lines=[line for line, use in zip(first_lines, usable, strict=True) if use]
     )
     return result
+
+
+def _remember(
+    result: xr.Dataset,
+    rows: xr.Dataset,
+    first: NDArray[np.intp],
+    table: Table,
+    layout: WideColumns | LongColumns,
+    states: Sequence[State],
+    settings: Settings,
+) -> None:
+    """Note on the data set which columns it came from."""
+    of_rows(rows, first, result)
+    origin = origin_of(result)
+    assert origin is not None
+    if isinstance(layout, WideColumns):
+        meanings = {
+            table.names[column.index]: f"reading behind a {_in_words(state, settings)}"
+            for column, state in zip(layout.readings, states, strict=True)
+        }
+        beside = {column.deviation for column in layout.readings} - {None}
+        meanings |= {
+            table.names[index]: "standard uncertainty of a reading" for index in beside if index is not None
+        }
+        if layout.dark is not None:
+            meanings[table.names[layout.dark]] = "reading without light"
+    else:
+        of_column = {
+            layout.reading: "readings behind an analyser",
+            layout.deviation: "standard uncertainties of the readings",
+            layout.analyzer: "angle or name of the analyser",
+            layout.retarder: "angle of the retarder",
+            layout.retardance: "retardance",
+            layout.state: "state of the analyser",
+        }
+        meanings = {table.names[index]: words for index, words in of_column.items() if index is not None}
+    meanings |= {table.names[index]: "" for index in layout.unused}
+    unused = {name: cells for name, cells in origin.unused.items() if name}
+    remember(result, replace(origin, meanings=(*origin.meanings, *meanings.items()), unused=unused))
 
 
 def _with_units(table: Table) -> Table:
@@ -657,4 +707,4 @@ def _has_readings(path: Path) -> bool:
     return holds_readings(column_names(path), stated=bool(stated))
 
 
-READER = Reader("readings", read_readings, extensions=(".csv", ".tsv", ".txt", ".dat"), sniff=_has_readings)
+READER = Reader("readings", read_readings, extensions=TABLE_EXTENSIONS, sniff=_has_readings)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from pbrdf.inversion.model_comparison import DESCRIBES, IN_PART, Comparison
 from pbrdf.report.comparison.subject import Compared, share
 from pbrdf.report.comparison.subject import table as ranking_table
-from pbrdf.report.dataset.describe import cautions, describe
+from pbrdf.report.dataset.describe import cautions, columns_in_words, describe
 from pbrdf.report.numbers import brief, per_cent, shown_unit, with_error
 from pbrdf.report.page import Section, bullets, command, markup, paragraph, render_page, table, terms
 from pbrdf.version import __version__
@@ -76,6 +76,8 @@ def page_text(report: Compared, figures: Mapping[str, Markup], files: Sequence[s
 def _measured(report: Compared) -> Iterator[Markup]:
     dataset = report.comparison.dataset
     yield bullets(describe(dataset))
+    if columns := columns_in_words(dataset):
+        yield paragraph(f"Columns of the file: {'; '.join(columns)}.")
     if warnings := cautions(dataset):
         yield paragraph("Assumed when the file was read, or left out of it:")
         yield bullets(warnings)

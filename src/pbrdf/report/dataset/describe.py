@@ -2,19 +2,30 @@
 
 from __future__ import annotations
 
+import re
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pbrdf.data.covariance import correlations
+from pbrdf.data.origin import origin_of
 from pbrdf.data.schema import COVARIANCE, NATURAL_LIGHT, NORMALISED, only_ratios, written
 from pbrdf.data.select import measured_channels
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["cautions", "describe", "illumination_in_words", "short_name", "wavelengths_in_words"]
+__all__ = [
+    "cautions",
+    "columns_in_words",
+    "describe",
+    "illumination_in_words",
+    "on_the_command_line",
+    "short_name",
+    "wavelengths_in_words",
+]
 
 _QUANTITIES = {
     "brdf": "BRDF, 1/sr",
@@ -58,9 +69,50 @@ def short_name(name: str, dataset: xr.Dataset) -> str:
     return Path(name).name + (f", {wavelengths}" if wavelengths.endswith("nm") else "")
 
 
+def columns_in_words(ds: xr.Dataset) -> list[str]:
+    """Lines that say what each column of the file was taken for, and which were not used; none for another format."""
+    origin = origin_of(ds)
+    if origin is None or not origin.meanings:
+        return []
+    used = [f"{name} → {meaning}" for name, meaning in origin.meanings if meaning]
+    unused = [name for name, meaning in origin.meanings if not meaning and name not in origin.dropped]
+    lines = [", ".join(used)]
+    if unused:
+        lines.append(f"not used: {', '.join(unused)}")
+    if origin.dropped:
+        lines.append(f"left out as asked: {', '.join(origin.dropped)}")
+    return lines
+
+
+def on_the_command_line(sentence: str) -> str:
+    """Turn the advice to use arguments of Python into advice to use the options of the command line."""
+
+    def option(match: re.Match[str]) -> str:
+        name = match["name"]
+        pairs = re.findall(r"'([^']*)': ('[^']*'|\"[^\"]*\"|…)", match["pairs"])
+        return " ".join(
+            f"--{name} {_quoted(f'{key}={value.strip(chr(39) + chr(34))}')}" for key, value in pairs
+        )
+
+    sentence = re.sub(r"\b(?P<name>column|where|unit)=\{(?P<pairs>[^{}]*)\}", option, sentence)
+    sentence = re.sub(r"\bignore=\[(['\"])(.*?)\1\]", lambda match: f"--ignore {_quoted(match[2])}", sentence)
+    return re.sub(
+        r"\b(azimuth|illumination|coverage)=(?:'([^']*)'|([\d.]+))",
+        lambda match: f"--{match[1]} {match[2] or match[3]}",
+        sentence,
+    )
+
+
+def _quoted(text: str) -> str:
+    """A word of a command line, in quotation marks where a shell needs them."""
+    return shlex.quote(text) if re.search(r"[\s()\[\]&;|<>$*?'\"]", text) else text
+
+
 def cautions(ds: xr.Dataset) -> list[str]:
     """Sentences on what the reader of the file assumed or left out."""
+    origin = origin_of(ds)
     sentences = [str(s) for s in ds.attrs.get("assumptions", ())]
+    sentences += [on_the_command_line(s) for s in (origin.remarks if origin else ())]
     if skipped := ds.attrs.get("skipped_rows"):
         sentences.append(f"{skipped} rows without a usable measurement were left out.")
     return [s[:1].upper() + s[1:] + ("" if s.endswith(".") else ".") for s in sentences]

@@ -15,7 +15,7 @@ from pbrdf.data.schema import written
 from pbrdf.inversion.erroranalysis import ErrorStatistics, error_analysis
 from pbrdf.inversion.holdout import Prediction
 from pbrdf.inversion.verdict import Verdict
-from pbrdf.report.dataset.describe import cautions, describe
+from pbrdf.report.dataset.describe import cautions, columns_in_words, describe
 from pbrdf.report.fit.subject import Report
 from pbrdf.report.fit.summary import (
     correlation_in_words,
@@ -98,6 +98,8 @@ def _undrawn(figures: Mapping[str, Markup]) -> list[Markup]:
 
 def _measured(report: Report) -> Iterator[Markup]:
     yield bullets(describe(report.dataset))
+    if columns := columns_in_words(report.dataset):
+        yield paragraph(f"Columns of the file: {'; '.join(columns)}.")
     if warnings := cautions(report.dataset):
         yield paragraph("Assumed when the file was read, or left out of it:")
         yield bullets(warnings)

@@ -14,7 +14,12 @@ from pbrdf.inversion.comparison import NEAR_SPECULAR, near_specular_tilt
 from pbrdf.inversion.estimates import Estimate
 from pbrdf.inversion.result import FitResult
 from pbrdf.inversion.verdict import Verdict
-from pbrdf.report.dataset.describe import cautions, illumination_in_words, wavelengths_in_words
+from pbrdf.report.dataset.describe import (
+    cautions,
+    columns_in_words,
+    illumination_in_words,
+    wavelengths_in_words,
+)
 from pbrdf.report.fit.subject import Report
 from pbrdf.report.numbers import brief, per_cent, shown_unit, with_error
 from pbrdf.report.printing import bare_table, print_parts
@@ -204,6 +209,8 @@ def _heading(report: Report) -> list[tuple[str, list[str]]]:
     ]
     if reading := report.settings.get("reading"):
         rows.insert(1, ("Read with", [", ".join(_options_in_words(reading))]))
+    if columns := columns_in_words(ds):
+        rows.insert(1, ("Columns", columns))
     if len(result.stages) > 1:
         rows.append(("Steps", [", then ".join(f"{s.name} ({s.points} geometries)" for s in result.stages)]))
     if result.hold_out is not None:

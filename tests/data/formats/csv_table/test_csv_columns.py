@@ -85,7 +85,7 @@ def test_dop_is_not_taken_for_dolp(text_file):
         ("theta_i,theta_r,I", {"column": {"phi": "=forward"}}, "constant '=forward' for phi is not a number"),
         ("theta_i [grad],theta_r,I", {}, r"unit of the column 'theta_i \[grad\]'.*deg or rad"),
         ("theta_i,theta_r,m00,m44", {}, "'m44' counts Mueller elements from 1"),
-        ("theta_i,theta_r,phi_i,phi_r,I", {}, "'phi_i' looks like an azimuth"),
+        ("theta_i,theta_r,phi_i,I", {}, "'phi_i' looks like an azimuth"),
         ("theta_i,theta_r,I", {"where": {"material": "x"}}, "no column 'material' to select by"),
         ("theta_i,theta_r,Q", {}, "the variables are Q"),
     ],

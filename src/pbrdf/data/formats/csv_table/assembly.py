@@ -20,7 +20,8 @@ from pbrdf.data.formats.csv_table.ratios import (
     swap_sp_of_ratios,
     without_derived,
 )
-from pbrdf.data.schema import NORMALISED, QUANTITIES, RATIOS, only_ratios, std_name
+from pbrdf.data.formats.csv_table.values import Values
+from pbrdf.data.schema import NORMALISED, RATIOS, std_name
 from pbrdf.errors import DataError
 from pbrdf.files.delimited import Table
 from pbrdf.optics.stokes import STOKES
@@ -35,8 +36,9 @@ def to_dataset(
     table: Table,
     header: Header,
     columns: list[Column],
-    values: dict[str, NDArray[Any]],
+    read: Values,
     ignored: list[str],
+    assumed: list[str],
 ) -> xr.Dataset:
     """Assemble what the columns hold.
 
@@ -48,10 +50,12 @@ def to_dataset(
         The file's conventions.
     columns
         The columns that were understood.
-    values
-        Their values by variable, as :func:`pbrdf.data.formats.csv_table.values.column_values` gives them.
+    read
+        Their values, as :func:`pbrdf.data.formats.csv_table.values.values_of` gives them.
     ignored
         Names of the columns left out.
+    assumed
+        Sentences on what the names of the columns left open.
 
     Returns
     -------
@@ -61,35 +65,17 @@ def to_dataset(
     Raises
     ------
     DataError
-        If the quantity is not stated, a side is not clear, or the variables do not fit together.
+        If a side is not clear, or the variables do not fit together.
     """
-    assumptions = []
-    azimuth = next((column for column in columns if column.variable == "phi"), None)
-    if azimuth is None and _in_mirror_direction(columns):
-        turned = values["theta_i"] < 0
-        if "group" not in values and turned.any() and not turned.all():
-            values["group"] = np.where(turned, "negative side", "positive side")
-        values["theta_i"] = values["theta_r"] = np.abs(values["theta_i"])
-        values["phi"] = np.zeros_like(values["theta_i"])
-        assumptions.append(
-            "theta_i and theta_r are the same column; the viewer was taken in the mirror direction (phi = 0), and "
-            "the sign as the side of the normal on which the source stands"
-        )
-    elif azimuth is not None:
-        if "azimuth" in header.unstated and azimuth.index is not None:
-            assumptions.append("the file does not say where phi = 0 lies; the forward half-plane was assumed")
-        phi = values["phi"]
-        values["phi"] = np.where(values["theta_r"] < 0, phi + np.where(phi > 0, -np.pi, np.pi), phi)
-    else:
-        _require_positive_incidence(table, values["theta_i"], columns)
-        values["phi"] = np.where(values["theta_r"] < 0, np.pi, 0.0)
-        assumptions.append(
-            "the file has no azimuth; theta_r >= 0 was taken as forward, theta_r < 0 as backward"
-        )
-    # Not abs(), which would lose the sign of −0.0 that a round trip has to keep.
-    values["theta_r"] = np.where(values["theta_r"] < 0, -values["theta_r"], values["theta_r"])
+    values = dict(read.arrays)
+    assumptions = [*_directions(table, header, columns, values), *assumed, *read.assumptions]
 
     channels = {name: values[name] for name in CHANNELS if name in values}
+    if not channels:
+        raise DataError(
+            f"{table.path}: no column holds values; name one, for example with column={{'I': …}}. The columns are "
+            f"{', '.join(table.names)}"
+        )
     std = {name: values[std_name(name)] for name in CHANNELS if std_name(name) in values}
     channels, std = (gather_ratios(_gather_mueller(part)) for part in (channels, std))
     if header.quantity == NORMALISED:
@@ -122,9 +108,11 @@ def to_dataset(
     if assumptions:
         extra["assumptions"] = assumptions
     coordinates = {name: values.get(name) for name in ("theta_i", "theta_r", "phi", "wavelength", "group")}
+    if read.scale is not None:
+        extra.setdefault("scale", header.attrs.get("scale", read.scale))
     attrs = {
         **header.attrs,
-        "quantity": _quantity(table, header, columns, only_ratios(channels)),
+        "quantity": read.quantity,
         "illumination": illumination,
         **extra,
     }
@@ -134,10 +122,64 @@ def to_dataset(
         raise DataError(f"{table.path}: {error}") from None
 
 
+def _directions(
+    table: Table, header: Header, columns: list[Column], values: dict[str, NDArray[Any]]
+) -> list[str]:
+    """Bring the directions in `values` to θ ≥ 0 and φ = 0 forward; sentences on what was assumed."""
+    assumptions = []
+    theta_i, theta_r = values["theta_i"], values["theta_r"]
+    stated = "azimuth" not in header.unstated
+    by_variable = {column.variable: column for column in columns}
+    if "phi" not in values and _in_mirror_direction(columns):
+        turned = theta_i < 0
+        if "group" not in values and turned.any() and not turned.all():
+            values["group"] = np.where(turned, "negative side", "positive side")
+        values["theta_i"] = values["theta_r"] = np.abs(theta_i)
+        values["phi"] = np.zeros_like(theta_i)
+        return [
+            "theta_i and theta_r are the same column; the viewer was taken in the mirror direction (phi = 0), and "
+            "the sign as the side of the normal on which the source stands"
+        ]
+    if "phi" in values:
+        phi = values["phi"]
+        if "phi_i" in by_variable:
+            if not stated:
+                assumptions.append(
+                    "the file does not say how its two azimuths are counted; phi is forward where they differ by 180 "
+                    "degrees, as for directions that point away from the surface"
+                )
+            # with both azimuths a negative zenith angle has one meaning on either side
+            phi = _turned(phi, theta_i < 0)
+            theta_i = np.where(theta_i < 0, -theta_i, theta_i)
+        elif not stated and by_variable["phi"].index is not None:
+            assumptions.append("the file does not say where phi = 0 lies; the forward half-plane was assumed")
+        values["phi"] = _turned(phi, theta_r < 0)
+    else:
+        if not stated:
+            _require_positive_incidence(table, theta_i, columns)
+            assumptions.append(
+                "the file has no azimuth; theta_r >= 0 was taken as forward, theta_r < 0 as backward"
+            )
+        # of a signed scan the specular side is that of equal signs, or of opposite ones where forward is 180
+        same_side = (theta_r < 0) == (theta_i < 0)
+        forward = same_side if header.forward_at_zero else ~same_side
+        values["phi"] = np.where(forward | (theta_r == 0), 0.0, np.pi)
+        theta_i = np.where(theta_i < 0, -theta_i, theta_i)
+    values["theta_i"] = theta_i
+    # Not abs(), which would lose the sign of −0.0 that a round trip has to keep.
+    values["theta_r"] = np.where(theta_r < 0, -theta_r, theta_r)
+    return assumptions
+
+
 def _in_mirror_direction(columns: list[Column]) -> bool:
     """Whether one column of the file holds both zenith angles."""
     found = {column.variable: column.index for column in columns}
     return found["theta_i"] is not None and found["theta_i"] == found["theta_r"]
+
+
+def _turned(phi: NDArray[np.float64], where: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Azimuths on the opposite side."""
+    return np.where(where, phi + np.where(phi > 0, -np.pi, np.pi), phi)
 
 
 def _require_positive_incidence(table: Table, theta_i: NDArray[np.float64], columns: list[Column]) -> None:
@@ -146,21 +188,10 @@ def _require_positive_incidence(table: Table, theta_i: NDArray[np.float64], colu
         index = next(column.index for column in columns if column.variable == "theta_i") or 0
         raise DataError(
             f"{table.place(int(negative[0]), index)}: a negative theta_i without an azimuth column could "
-            "mean either side; count theta_i from 0 to 90 and give theta_r the sign, or add phi"
+            "mean either side; count theta_i from 0 to 90 and give theta_r the sign, or add phi, or say which side is "
+            "specular: azimuth='forward=0' where theta_i and theta_r have the same sign there, azimuth='forward=180' "
+            "where they have opposite ones"
         )
-
-
-def _quantity(table: Table, header: Header, columns: list[Column], ratios: bool) -> str:
-    if header.quantity is None and ratios:
-        return NORMALISED
-    implied = next((c.quantity for c in columns if c.variable == "I"), None)
-    if header.quantity is None and implied is None:
-        raise DataError(
-            f"{table.path}: it does not say what was measured; add a line '# quantity: …' or the option "
-            f"quantity, one of {', '.join(QUANTITIES)}"
-            + ("" if any(c.variable in ("I", "m00") for c in columns) else " (divided by an intensity)")
-        )
-    return header.quantity or str(implied)
 
 
 def _gather_mueller(values: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:

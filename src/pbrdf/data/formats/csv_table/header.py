@@ -15,7 +15,12 @@ from pbrdf.files.delimited import Table
 
 __all__ = ["Header", "statements"]
 
-_OWN_KEYS = ("quantity", "illumination", "simulated", *FILE_KEYS)
+_OWN_KEYS = ("quantity", "illumination", "simulated", "scale", *FILE_KEYS)
+#: The key, which no line can have, of a remark that the uncertainties are expanded ones.
+_EXPANDED = "expanded uncertainties"
+#: Characters of a remark.
+_LOOKED_AT = 200
+_ANGLES = {"degrees": True, "radians": False, "deg": True, "rad": False, "degree": True, "radian": False}
 _YES_NO = {"yes": True, "1": True, "true": True, "no": False, "0": False, "false": False}
 
 
@@ -28,6 +33,12 @@ def statements(table: Table) -> dict[str, str]:
             key, value = statement[1], statement[2].strip()
             lowered = key.lower()
             stated[lowered if lowered in (*_OWN_KEYS, *TEXT_ATTRIBUTES) else key] = value
+        elif line < table.statements_end and re.search(r"(?i)expanded|coverage factor", comment[:_LOOKED_AT]):
+            stated[_EXPANDED] = "expanded" if "expanded" in comment.lower() else ""
+            if factor := re.search(
+                r"(?<![\w.])(?:k|factor)\s*(?:=|of|:)?\s*(\d+(?:\.\d+)?)", comment[:_LOOKED_AT]
+            ):
+                stated.setdefault("coverage", factor[1])
     return stated
 
 
@@ -45,6 +56,12 @@ class Header:
         Stokes vector of the source, in the file's convention.
     unstated
         Those of ``azimuth`` and ``stokes`` that the file does not state.
+    illumination_stated
+        Whether the illumination is stated.
+    coverage
+        Coverage factor of expanded uncertainties that do not state their own; None if nothing says so.
+    expanded
+        Whether the file says in words that its uncertainties are expanded ones.
     attrs
         All other statements, as attributes.
     """
@@ -56,6 +73,9 @@ class Header:
     cosine_weighted: bool
     degrees: bool
     unstated: frozenset[str]
+    illumination_stated: bool = False
+    coverage: float | None = None
+    expanded: bool = False
     attrs: dict[str, Any] = field(default_factory=dict)
 
     @classmethod
@@ -65,25 +85,42 @@ class Header:
         def choose(key: str, choices: Mapping[str, Any], default: str) -> Any:
             text = str(statements.get(key, default)).replace(" ", "").lower()
             if text not in choices:
-                raise DataError(f"{path}: {key} is {statements[key]!r}; use {' or '.join(choices)}")
+                shown = ("degrees", "radians") if key == "angles" else choices
+                raise DataError(f"{path}: {key} is {statements[key]!r}; use {' or '.join(shown)}")
             return choices[text]
 
         if "quantity" in statements and statements["quantity"] not in QUANTITIES:
             raise DataError(f"{path}: quantity is {statements['quantity']!r}; use {' or '.join(QUANTITIES)}")
         attrs = {
-            key: decode_attribute(key, value) for key, value in statements.items() if key not in _OWN_KEYS
+            key: decode_attribute(key, value)
+            for key, value in statements.items()
+            if key not in (*_OWN_KEYS, _EXPANDED)
         }
         attrs["simulated"] = int(choose("simulated", _YES_NO, "0"))
+        if "scale" in statements:
+            attrs["scale"] = choose("scale", {"arbitrary": "arbitrary", "absolute": "absolute"}, "absolute")
         return cls(
             quantity=statements.get("quantity"),
             forward_at_zero=choose("azimuth", {"forward=0": True, "forward=180": False}, "forward=0"),
             p_minus_s=choose("stokes", {"p-s": True, "s-p": False}, "p-s"),
             illumination=_illumination(path, statements.get("illumination", "natural")),
             cosine_weighted=choose("cosine_weighted", _YES_NO, "no"),
-            degrees=choose("angles", {"degrees": True, "radians": False}, "degrees"),
+            degrees=choose("angles", _ANGLES, "degrees"),
             unstated=frozenset(("azimuth", "stokes")) - statements.keys(),
+            illumination_stated="illumination" in statements,
+            coverage=_coverage(path, statements.get("coverage")),
+            expanded=bool(statements.get(_EXPANDED)),
             attrs=attrs,
         )
+
+
+def _coverage(path: Path, stated: Any) -> float | None:
+    if stated is None:
+        return None
+    match = re.fullmatch(r"(?:k\s*=\s*)?(\d+(?:\.\d+)?)", str(stated).strip())
+    if match is None or float(match[1]) <= 0.0:
+        raise DataError(f"{path}: coverage is {stated!r}; use the coverage factor k, such as 2")
+    return float(match[1])
 
 
 def _illumination(path: Path, stated: str | Sequence[float]) -> list[float]:

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrdf.data import conventions
-from pbrdf.data.schema import NORMALISED, is_ratio, std_name, written
+from pbrdf.data.schema import NORMALISED, std_name, written
 from pbrdf.errors import DataError
 from pbrdf.optics.angles import within_half_turn
 
@@ -27,7 +27,7 @@ __all__ = [
     "already_divided",
     "gather_ratios",
     "ratio_variable",
-    "ratios_of_column",
+    "signed_ratio",
     "swap_sp_of_ratios",
     "without_derived",
 ]
@@ -48,7 +48,6 @@ _ELEMENT = re.compile(r"(m|mm|mueller|fr|f|s|p|a)([0-4])([0-4])")
 _ONE = 1e-3
 #: Rounding up to which a derived column repeats others; light less polarised than this has no angle to compare.
 _ROUNDED, _UNPOLARISED = 0.02, 0.05
-_PER_CENT = ("%", "percent", "per cent", "pct")
 
 
 def ratio_variable(key: str) -> str | None:
@@ -84,26 +83,9 @@ def ratio_variable(key: str) -> str | None:
     return f"m{i}{j}_over_m00"
 
 
-def ratios_of_column(
-    values: NDArray[np.float64], variable: str, name: str, unit: str | None
-) -> NDArray[np.float64]:
-    """Values of a column as the ratios that they are: per cent divided by 100, turned by a minus before the name.
-
-    Parameters
-    ----------
-    values
-        What the column holds.
-    variable
-        What it stands for; columns of no ratio are returned as they are.
-    name, unit
-        Its name in the file, empty for a constant, and its unit.
-    """
-    ratio = variable.removesuffix("_std")
-    if not is_ratio(ratio):
-        return values
-    if (unit or "").strip().lower() in _PER_CENT:
-        values = values / 100.0
-    return -values if ratio == variable and ratio != "dolp" and _MINUS.match(name) else values
+def signed_ratio(values: NDArray[np.float64], name: str) -> NDArray[np.float64]:
+    """Values of a column of a ratio, turned by a minus before its name in the file."""
+    return -values if _MINUS.match(name) else values
 
 
 def gather_ratios(values: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:

@@ -5,14 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+import numpy as np
 import xarray as xr
 
 from pbrdf.data.formats.csv_table.assembly import to_dataset
-from pbrdf.data.formats.csv_table.columns import resolve_columns
+from pbrdf.data.formats.csv_table.columns import Resolved, resolve_columns
 from pbrdf.data.formats.csv_table.header import Header, statements
-from pbrdf.data.formats.csv_table.values import column_values
+from pbrdf.data.formats.csv_table.hints import comment_units
+from pbrdf.data.formats.csv_table.names import AZIMUTHS, parse_name
+from pbrdf.data.formats.csv_table.values import Values, values_of
+from pbrdf.data.formats.csv_table.wide import long_table
 from pbrdf.data.formats.csv_table.writing import write_csv
 from pbrdf.data.formats.declaration import Reader
+from pbrdf.data.origin import Origin, of_rows, origin_of, remember
 from pbrdf.data.validation import check, validate
 from pbrdf.errors import DataError
 from pbrdf.files.delimited import TABLE_EXTENSIONS, Table, read_table
@@ -32,6 +37,10 @@ def read_csv(
     illumination: str | Sequence[float] | None = None,
     cosine_weighted: bool | str | None = None,
     angles: str | None = None,
+    unit: Mapping[str, str] | None = None,
+    coverage: float | str | None = None,
+    scale: str | None = None,
+    ignore: Sequence[str] = (),
     sheet: str | None = None,
 ) -> xr.Dataset:
     """Read a CSV table; :mod:`pbrdf.data.formats.csv_table` describes the format.
@@ -50,8 +59,13 @@ def read_csv(
     skip_invalid
         Leave out rows with angles or values that the schema does not allow, and rows where nothing was
         measured. How many is recorded in the attribute ``skipped_rows``.
-    quantity, azimuth, stokes, illumination, cosine_weighted, angles
+    quantity, azimuth, stokes, illumination, cosine_weighted, angles, coverage, scale
         As the header keys of the same names, for files that do not state them, or state them wrongly.
+    unit
+        Units of columns, by the name used here or by the file's: ``{"I": "%", "theta_i": "mrad"}``. They count before
+        what the file says.
+    ignore
+        Names of columns to leave out without a word.
     sheet
         Of a workbook (``.xlsx``, ``.xls``, ``.ods``), where several hold numbers.
 
@@ -76,6 +90,10 @@ def read_csv(
         illumination=illumination,
         cosine_weighted=cosine_weighted,
         angles=angles,
+        unit=unit,
+        coverage=coverage,
+        scale=scale,
+        ignore=ignore,
     )
     return ds
 
@@ -92,6 +110,10 @@ def read_rows(
     illumination: str | Sequence[float] | None = None,
     cosine_weighted: bool | str | None = None,
     angles: str | None = None,
+    unit: Mapping[str, str] | None = None,
+    coverage: float | str | None = None,
+    scale: str | None = None,
+    ignore: Sequence[str] = (),
 ) -> tuple[xr.Dataset, list[int]]:
     """The rows of a table that is read already, with the options of :func:`read_csv`.
 
@@ -111,23 +133,51 @@ def read_rows(
         "illumination": illumination,
         "cosine_weighted": cosine_weighted,
         "angles": angles,
+        "coverage": coverage,
+        "scale": scale,
     }
     given = {key: value for key, value in options.items() if value is not None}
-    header = Header.parse(path, statements(table) | given)
-    columns, ignored = resolve_columns(path, table.names, column or {})
+    stated = {key: value for key, value in statements(table).items() if key not in comment_units(table)[2]}
+    header = Header.parse(path, stated | given)
     if where:
         table = selected(table, where)
-
-    values = {source.variable: column_values(table, source, header) for source in columns}
-    names = {c.variable: table.names[c.index] for c in columns if c.index is not None}
-    ds = to_dataset(table, header, columns, values, ignored)
+    table, widened = long_table(table, column or {})
+    resolved = resolve_columns(table, header, column or {}, unit, ignore)
+    read = values_of(table, resolved.columns, header, None if angles else resolved.angles)
+    ignored = [table.names[index] for index in resolved.unused]
+    ds = to_dataset(table, header, resolved.columns, read, ignored, resolved.assumptions)
     if table.warnings:
         ds.attrs["assumptions"] = [*ds.attrs.get("assumptions", ()), *table.warnings]
-    lines = table.lines
+    remember(ds, _origin(table, resolved, read, widened, ignore))
     if skip_invalid:
-        ds, lines = _without_invalid(ds, lines)
-    validate(ds, origin=table.origin, lines=lines, columns=names)
-    return ds, lines
+        ds = _without_invalid(ds)
+    validate(ds, origin=table.origin)
+    origin = origin_of(ds)
+    assert origin is not None
+    return ds, list(origin.lines)
+
+
+def _origin(
+    table: Table, resolved: Resolved, read: Values, widened: Mapping[str, str], ignore: Sequence[str]
+) -> Origin:
+    taken = {c.index: c.variable for c in resolved.columns if c.index is not None}
+    meanings = []
+    for index, name in enumerate(table.names):
+        variable = taken.get(index)
+        meaning = read.meanings.get(variable, variable) if variable else ""
+        if widened.get(name):
+            meaning += ", each at its wavelength"
+        if widened.get(name, name):
+            meanings.append((widened.get(name, name), meaning))
+    unused = {
+        table.names[index]: tuple(table.cells(index))
+        for index in resolved.unused
+        if table.names[index] not in ignore and parse_name(table.names[index]).uncertainty is None
+    }
+    names = {variable: table.names[index] for index, variable in taken.items() if variable not in AZIMUTHS}
+    return Origin(
+        tuple(table.lines), names, tuple(meanings), (*resolved.remarks, *read.remarks), unused, tuple(ignore)
+    )
 
 
 def selected(table: Table, where: Mapping[str, str]) -> Table:
@@ -149,17 +199,17 @@ def selected(table: Table, where: Mapping[str, str]) -> Table:
     return table.taken(keep)
 
 
-def _without_invalid(ds: xr.Dataset, lines: list[int]) -> tuple[xr.Dataset, list[int]]:
+def _without_invalid(ds: xr.Dataset) -> xr.Dataset:
     bad: set[int] = set()
     for issue in check(ds):
         # The only issue that concerns rows but no variable is that nothing was measured there.
-        if issue.severity == "error" or not issue.variable:
+        if issue.rows and (issue.severity == "error" or not issue.variable):
             bad.update(issue.rows)
-    keep = [row for row in range(ds.sizes["geometry"]) if row not in bad]
-    kept = ds.isel(geometry=keep)
+    keep = np.array([row for row in range(ds.sizes["geometry"]) if row not in bad], dtype=np.intp)
+    kept = of_rows(ds, keep, ds.isel(geometry=keep))
     if bad:
         kept.attrs["skipped_rows"] = len(bad)
-    return kept, [lines[row] for row in keep]
+    return kept
 
 
 READER = Reader("csv", read_csv, extensions=TABLE_EXTENSIONS, write=write_csv, written=(".csv",))

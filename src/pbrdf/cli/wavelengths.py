@@ -1,0 +1,59 @@
+"""Data of many wavelengths, before a model is fitted to them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from pbrdf.cli.reading import Reading
+from pbrdf.errors import DataError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["MANY", "require_choice"]
+
+#: From so many wavelengths on, one set of parameters for all is hardly meant: it has to be said.
+MANY = 6
+
+
+def require_choice(
+    dataset: xr.Dataset, reading: Reading, source: str, *, by_wavelength: bool | None = None
+) -> None:
+    """Raise, with the choices, if a file of many wavelengths is to be fitted and nothing says how.
+
+    Parameters
+    ----------
+    dataset
+        The data.
+    reading
+        How they were read: wavelengths that were selected are a choice.
+    source
+        Name of the file.
+    by_wavelength
+        Whether a parameter is free for each wavelength; None where the command has no such option.
+
+    Raises
+    ------
+    DataError
+        If there are :data:`MANY` wavelengths or more and none of the choices was made.
+    """
+    import numpy as np
+
+    if "wavelength" not in dataset.coords or by_wavelength or reading.wavelength:
+        return
+    if any(text.strip().startswith("wavelength") for text in reading.select):
+        return
+    known = np.unique(dataset["wavelength"].values)
+    known = known[np.isfinite(known)]
+    if known.size < MANY:
+        return
+    middle = known[known.size // 2]
+    low, high = np.floor(known[0]), np.ceil(known[-1])
+    split = "" if by_wavelength is None else "; --split a=wavelength for a of each and the rest shared"
+    raise DataError(
+        f"{source}: there are {known.size} wavelengths, {known[0]:g} … {known[-1]:g} nm, and one set of "
+        "parameters for all "
+        f"would be fitted; choose --wavelength {middle:g} for one{split}; or --select "
+        f"wavelength={low:g}:{high:g} if one "
+        "set for these is meant"
+    )
