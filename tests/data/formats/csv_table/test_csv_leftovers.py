@@ -51,6 +51,10 @@ def test_a_second_sample_is_named(text_file, name):
 
 def test_a_sample_that_is_one_needs_no_word(text_file):
     assert (
+        check(read(text_file(f"{STATED}theta_i,theta_r,phi,I,theta_plotted\n30,20,0,0.3,1\n30,30,0,0.4,2\n")))
+        == []
+    )
+    assert (
         check(read(text_file(f"{STATED}theta_i,theta_r,phi,I,sample\n30,20,0,0.3,A\n30,30,0,0.4,A\n"))) == []
     )
 

@@ -20,7 +20,7 @@ __all__ = [
 
 _AZIMUTH = re.compile(r"(?<![a-z])phi(?![a-z]{2})|azim")
 _SAMPLE = re.compile(
-    r"sample|material|specimen|coating|paint|target|plate|panel|surface|substrate|batch|lot|coupon|tile|replica|probe"
+    r"(?<![a-z])(?:sample|material|specimen|coating|paint|target|plate|panel|surface|substrate|batch|lot|coupon|tile|replica|probe)"
 )
 _SAMPLE_WORDS = frozenset(
     ("name", "id", "label", "part", "piece", "object", "run", "scan", "side", "position", "day")
