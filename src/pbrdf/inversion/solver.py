@@ -33,8 +33,8 @@ __all__ = ["LOSSES", "Residuals", "Solution", "Status", "linearise", "solve"]
 #: lanes runs for as many as make LAUNCH evaluations: recording the kernel anew would take longer than idle lanes do.
 ROUNDS, SMALL_BATCH, LAUNCH = 6, 1024, 1 << 18
 #: Up to SMALL_BATCH lanes that make more than SLICE evaluations in an iteration are wide: SLICE evaluations a launch
-#: (about a second of one core), shared by about WIDTH lanes.
-SLICE, WIDTH = 1 << 16, 2048
+#: (about half a second of one core), shared by about WIDTH lanes.
+SLICE, WIDTH = 1 << 15, 2048
 
 #: How often a step is solved again with the unknowns that would cross a bound held on it.
 BOUND_PASSES = 2
