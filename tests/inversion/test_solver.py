@@ -262,19 +262,6 @@ def test_lanes_that_share_out_their_points_reach_the_same(noisy_exponentials, mo
     np.testing.assert_allclose(shared.information, alone.information, rtol=1e-7)
 
 
-def test_an_unknown_without_influence_neither_moves_nor_stops_the_others():
-    """r = (u0 − 1, 1e-14 u1): the second column is rounding; a step by it would go from bound to bound."""
-
-    def function(u, lane, point):
-        return [u[0] - 1.0, 1e-14 * u[1] + 2.0], None
-
-    solution = solve(
-        Residuals(function, 1), np.array([[3.0, 0.5], [-1.0, 0.2]]), np.full(2, -5.0), np.full(2, 5.0)
-    )
-    assert solution.converged.all()
-    np.testing.assert_allclose(solution.u, [[1.0, 0.5], [1.0, 0.2]], atol=1e-7)
-
-
 def test_a_kink_is_a_minimum_though_its_gradient_does_not_vanish():
     """r = |u| + 1: the step from 0 promises what it never keeps; the lane stops soon, and stalled."""
 

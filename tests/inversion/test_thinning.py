@@ -86,3 +86,24 @@ def test_the_fit_of_dense_data_is_that_of_all_geometries(monkeypatch):
             assert quick.estimates[name].std == pytest.approx(e.std, rel=1e-5)
             assert abs(e.value - PAINT.values[name]) < 4.0 * e.std
     assert quick.optima[0].chi2 == quick.goodness.chi2
+
+
+@pytest.mark.slow
+def test_the_stepwise_strategy_searches_the_part_too():
+    ds = dense(3000)
+    result = pbrdf.fit(ds, strategy="stepwise", starts=4)
+    names = [(s.name, s.points) for s in result.stages]
+    assert names[-2:] == [("search", 1000), ("joint", 3000)] and names[0][0] == "diffuse"
+    assert result.goodness.chi2 == pytest.approx(pbrdf.fit(ds, starts=4).goodness.chi2, rel=1e-9)
+    used = result.comparison["used_for_diffuse"].values
+    tilt = result.comparison["facet_tilt"].values
+    assert used.any() and tilt[used].min() > tilt[~used].max()
+
+
+@pytest.mark.slow
+def test_folds_of_dense_data_are_refined_on_all_that_is_left():
+    ds = dense(3000)
+    validated = pbrdf.cross_validate(ds, by="theta_i", folds=2, starts=2)
+    for fold in validated.folds:
+        assert fold.converged
+        assert fold.values["n"] == pytest.approx(1.55, abs=0.05)

@@ -188,9 +188,9 @@ def fit(
         dataset, observations, fitted_data, held, space, solution, first, words, hold_out, seconds
     )
     result.stages.extend(stages)
-    if stages[0].name == "search":
+    for searched in (stage for stage in stages if stage.name == "search"):
         result.notes.append(
-            f"The starts searched {stages[0].points} of the {stages[-1].points} geometries, drawn evenly over the "
+            f"The starts searched {searched.points} of the {stages[-1].points} geometries, drawn evenly over the "
             "directions; what they found best was refined on all, and its χ² and errors are those of all."
         )
     if diffuse is not None:

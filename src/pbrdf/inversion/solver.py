@@ -33,8 +33,8 @@ __all__ = ["LOSSES", "Residuals", "Solution", "Status", "linearise", "solve"]
 #: lanes runs for as many as make LAUNCH evaluations: recording the kernel anew would take longer than idle lanes do.
 ROUNDS, SMALL_BATCH, LAUNCH = 6, 1024, 1 << 18
 #: Up to SMALL_BATCH lanes that make more than SLICE evaluations in an iteration are wide: SLICE evaluations a launch
-#: (about a second of one core), shared by about WIDTH lanes.
-SLICE, WIDTH = 1 << 16, 2048
+#: (about half a second of one core), shared by about WIDTH lanes.
+SLICE, WIDTH = 1 << 15, 2048
 
 #: How often a step is solved again with the unknowns that would cross a bound held on it.
 BOUND_PASSES = 2
@@ -423,14 +423,7 @@ def _propose(state: _State) -> tuple[list[Any], Any]:
 
     u, g, size, low, high = state.u, state.g, len(state.u), state.low, state.high
     A = _unpack(state.A, size)
-    # where a derivative is nothing but rounding, as that by the radius of a source at 0, so would be its step
-    least = [
-        dr.select(dr.isfinite(state.cost), NO_INFLUENCE**2 * state.cost, 0.0)
-        / dr.maximum((b - a) * (b - a), 1e-300)
-        for a, b in zip(low, high, strict=True)
-    ]
-    idle = [A[i][i] <= least[i] for i in range(size)]
-    step = _bounded_step(A, g, state.damping, u, low, high, idle)
+    step = _bounded_step(A, g, state.damping, u, low, high)
     trial = [dr.clip(u[i] + step[i], low[i], high[i]) for i in range(size)]
     delta = [trial[i] - u[i] for i in range(size)]
     # −(gᵀδ + ½ δᵀAδ), the reduction that the quadratic model promises for the projected step
@@ -650,22 +643,13 @@ def _leaving(g: list[Any], u: list[Any], low: list[Any], high: list[Any]) -> lis
 
 
 def _bounded_step(
-    A: list[list[Any]],
-    g: list[Any],
-    damping: Any,
-    u: list[Any],
-    low: list[Any],
-    high: list[Any],
-    idle: list[Any],
+    A: list[list[Any]], g: list[Any], damping: Any, u: list[Any], low: list[Any], high: list[Any]
 ) -> list[Any]:
-    """Solve (A + λ diag A) δ = −g, then again with the unknowns on the bounds that they would cross.
-
-    Those that are ``idle`` stay where they are.
-    """
+    """Solve (A + λ diag A) δ = −g, then again with the unknowns on the bounds that they would cross."""
     import drjit as dr
 
     size = len(u)
-    held = [leaving | still for leaving, still in zip(_leaving(g, u, low, high), idle, strict=True)]
+    held = _leaving(g, u, low, high)
     known = [dr.zeros(type(u[0]), 1) for _ in range(size)]
     step = _damped_step(A, g, damping, held, known)
     for _ in range(BOUND_PASSES):

@@ -121,7 +121,7 @@ def stepwise(
     space, data, first, max_iterations, progress
         As for :func:`joint`.
     polish
-        Whether all parameters are fitted together in the end.
+        Whether all parameters are fitted together in the end: only then are many geometries searched in part.
     diffuse_tilt
         Facet tilt in radians beyond which a geometry counts as diffuse; None chooses it from the running width.
 
@@ -157,6 +157,16 @@ def stepwise(
         )
     low, high = space.box
     tilt = facet_tilt(data.theta_i, data.theta_r, data.phi)
+    part = thinned(space, data) if polish else None
+    if part is not None:
+        found, steps, _ = stepwise(
+            space, part, first, max_iterations, progress, polish=True, diffuse_tilt=diffuse_tilt
+        )
+        solution = _on_all(space, data, part, found, low, high, max_iterations, progress)
+        width = float(space.build(list(steps[-1].values.values())).lobe_width())
+        chosen = _choose(tilt, data, diffuse_tilt, width, len(diffuse_free), shrink=False)
+        steps = [*steps[:-1], replace(steps[-1], name="search")]
+        return solution, [*steps, _stage("joint", space, solution, names, data)], chosen
 
     # all but the diffuse parameters start the first step at their defaults, the diffuse ones all over the bounds
     u = first.copy()
