@@ -145,7 +145,10 @@ class MapWriter:
         else:
             import zarr
 
-            self._head.to_zarr(self._path, mode="w-", zarr_format=2, consolidated=False)
+            # a chunk of nothing but bad pixels is written as well: one that is not there was lost
+            self._head.to_zarr(
+                self._path, mode="w-", zarr_format=2, consolidated=False, write_empty_chunks=True
+            )
             self._file = zarr.open_group(self._path, mode="r+", zarr_format=2)
         self._variables = {name: self._variable(name) for name in self.names}
         self._buffers = {name: np.empty(self._chunk_shape[1:], _type(name)) for name in self.names}
@@ -168,7 +171,12 @@ class MapWriter:
             variable = self._file.create_variable(name, dims, dtype, chunks=self._chunk_shape, fillvalue=fill)
         else:
             variable = self._file.create_array(
-                name, shape=self._shape, chunks=self._chunk_shape, dtype=dtype, fill_value=fill
+                name,
+                shape=self._shape,
+                chunks=self._chunk_shape,
+                dtype=dtype,
+                fill_value=fill,
+                config={"write_empty_chunks": True},
             )
             attributes = {**attributes, "_ARRAY_DIMENSIONS": list(dims)}
         for key, value in attributes.items():
