@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from pbrdf.errors import PbrdfError
+from pbrdf.files.plain_numbers import number_from_text
 
 __all__ = ["angles", "bounds", "number", "numbers", "pairs", "require_folder_of", "share", "stokes_vector"]
 
@@ -23,7 +24,7 @@ def number(text: str, option: str) -> float:
         If it is none; names the option.
     """
     try:
-        value = float(text)
+        value = number_from_text(text)
     except ValueError:
         value = math.nan
     if not math.isfinite(value):

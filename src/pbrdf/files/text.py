@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
 from typing import Any
 
 from pbrdf.errors import DataError
+from pbrdf.files.plain_numbers import toml_from_text
 
 __all__ = ["first_bytes", "lines_of", "read_lines", "read_toml"]
 
@@ -46,8 +46,10 @@ def read_toml(path: Path) -> dict[str, Any]:
         As :func:`read_lines`, and if it is not TOML.
     """
     try:
-        return tomllib.loads("\n".join(read_lines(path)))
-    except tomllib.TOMLDecodeError as error:
+        return toml_from_text("\n".join(read_lines(path)))
+    except DataError:
+        raise
+    except ValueError as error:
         raise DataError(f"{path}: not a TOML file: {error}") from error
 
 

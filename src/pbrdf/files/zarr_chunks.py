@@ -9,7 +9,6 @@ version 2 (``.zarray``, ``.zmetadata``) and 3 (``zarr.json``).
 from __future__ import annotations
 
 import itertools
-import json
 import math
 import os
 import struct
@@ -23,6 +22,7 @@ import numpy as np
 from pbrdf.errors import DataError
 from pbrdf.files.hdf5_guard import available_memory
 from pbrdf.files.hdf5_probe import ALWAYS_ALLOWED, amount
+from pbrdf.files.plain_numbers import json_from_text
 
 __all__ = ["require_complete"]
 
@@ -121,8 +121,8 @@ def _node_type(content: Any) -> Any:
 
 def _json(file: Path) -> Any:
     try:
-        return json.loads(file.read_bytes())
-    except (ValueError, RecursionError) as error:
+        return json_from_text(file.read_bytes())
+    except ValueError as error:
         raise DataError(f"{file}: not JSON ({error}): the Zarr folder is damaged") from error
 
 

@@ -388,8 +388,10 @@ def _checked_value(parameter: Parameter, value: Any) -> Any:
         numbers = drjit_to_numpy(value)
     else:
         try:
+            if np.asarray(value).dtype.kind in "bSU":  # NumPy would make numbers of true, and of "1_0"
+                raise TypeError
             numbers = np.asarray(value, dtype=float)
-        except (TypeError, ValueError) as error:
+        except (TypeError, ValueError, OverflowError) as error:
             raise ModelError(f"{parameter.name}={value!r} is not a number") from error
         if numbers.size == 0:
             raise ModelError(f"{parameter.name} is an empty array: give a number or an array of numbers")

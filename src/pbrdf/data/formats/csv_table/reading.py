@@ -19,6 +19,9 @@ from pbrdf.files.delimited import Table, read_table
 
 __all__ = ["READER", "read_csv"]
 
+#: Characters of a column's name; more are a damaged line.
+_LONGEST_NAME = 1000
+
 
 def read_csv(
     path: str | Path,
@@ -65,6 +68,8 @@ def read_csv(
     path = Path(path)
     table = read_table(path)
     table.require_rows()
+    if len(longest := max(table.names, key=len)) > _LONGEST_NAME:
+        raise DataError(f"{path}: line {table.names_line}: {longest[:40]!r}… is no name of a column")
     options = {
         "quantity": quantity,
         "azimuth": azimuth,
