@@ -1,7 +1,8 @@
 """netCDF-4 files by h5netcdf: read under guard, written whole.
 
-Reading goes through :mod:`pbrdf.files.hdf5_guard`. A file is made in memory and then written as any other: where the
-disk is full, the HDF5 library may end the whole program as it closes the file.
+Reading goes through :mod:`pbrdf.files.hdf5_guard`. Where the disk is full, the HDF5 library may end the whole program
+as it closes the file. So a file is made in memory and then written as any other, and one that is too large for that is
+written through :class:`PatientFile`.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from pbrdf.files.hdf5_guard import Look
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["SIGNATURE", "load_netcdf", "open_netcdf", "write_netcdf_file"]
+__all__ = ["SIGNATURE", "PatientFile", "load_netcdf", "open_netcdf", "write_netcdf_file"]
 
 #: How HDF5 files begin, of which netCDF-4 is a kind.
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
@@ -104,3 +105,63 @@ def write_netcdf_file(path: Path, groups: Mapping[str, xr.Dataset]) -> None:
             dataset.dump_to_store(H5NetCDFStore(file, group=None if name == "/" else name))
     with path.open("wb") as target:
         target.write(content.getbuffer())
+
+
+class PatientFile(io.RawIOBase):
+    """A file that is there, for the HDF5 library to write to, in which no write fails as far as that can see.
+
+    Attributes
+    ----------
+    error
+        What went wrong first, None as long as nothing did; what comes later is dropped.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._file = path.open("r+b", buffering=0)
+        self.error: OSError | None = None
+
+    def require_written(self) -> None:
+        """Raises OSError if something went wrong."""
+        if self.error is not None:
+            raise self.error
+
+    def write(self, content: Any, /) -> int:
+        """Write all of it."""
+        rest = memoryview(content).cast("B")
+        length = len(rest)
+        try:
+            while self.error is None and len(rest):
+                rest = rest[self._file.write(rest) :]
+        except OSError as error:
+            self.error = error
+        return length
+
+    def truncate(self, size: int | None = None, /) -> int:
+        """Make the file as long as this."""
+        try:
+            return self._file.truncate(size)
+        except OSError as error:
+            self.error = self.error or error
+            return size or 0
+
+    def seek(self, offset: int, whence: int = io.SEEK_SET, /) -> int:
+        return self._file.seek(offset, whence)
+
+    def tell(self) -> int:
+        return self._file.tell()
+
+    def readinto(self, buffer: Any, /) -> int | None:
+        return self._file.readinto(buffer)
+
+    def readable(self) -> bool:
+        return True
+
+    def writable(self) -> bool:
+        return True
+
+    def seekable(self) -> bool:
+        return True
+
+    def close(self) -> None:
+        self._file.close()
+        super().close()

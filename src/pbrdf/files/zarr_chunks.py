@@ -8,7 +8,6 @@ version 2 (``.zarray``, ``.zmetadata``) and 3 (``zarr.json``).
 
 from __future__ import annotations
 
-import itertools
 import math
 import os
 import struct
@@ -53,8 +52,13 @@ class _Array:
             yield self.prefix or "0"
             return
         start = f"{self.prefix}{self.separator}" if self.prefix else ""
-        for index in itertools.product(*map(range, self.grid)):
-            yield start + self.separator.join(map(str, index))
+        grid = self.grid
+        for number in range(math.prod(grid)):  # itertools.product would list the ranges, however long
+            index = []
+            for length in reversed(grid):
+                number, i = divmod(number, length)
+                index.append(str(i))
+            yield start + self.separator.join(reversed(index))
 
 
 def require_complete(path: Path, *, loaded: bool = True) -> None:

@@ -47,20 +47,19 @@ def require_checksums(path: Path) -> None:
         If a checksum is wrong, or the file ends too early; names the chunk.
     """
     content = memoryview(path.read_bytes())
+    where = f"{path}: cannot be read as a picture"
     if content[:8] != _SIGNATURE:
-        raise DataError(f"{path}: this is not a PNG file")
+        raise DataError(f"{where}: this is not a PNG file")
     at, kind = 8, b""
     while kind != b"IEND":
         if at + _CHUNK.size > len(content):
-            raise DataError(
-                f"{path}: the PNG file ends at byte {len(content)}, before its last part: it is cut off"
-            )
+            raise DataError(f"{where}: it ends at byte {len(content)}, before its last part: it is cut off")
         length, kind = _CHUNK.unpack_from(content, at)
         end = at + _CHUNK.size + length
         if end + 4 > len(content):
-            raise DataError(f"{path}: the PNG file ends within its part {kind!r}: it is cut off")
+            raise DataError(f"{where}: it ends within its part {kind!r}: it is cut off")
         if zlib.crc32(content[at + 4 : end]) != int.from_bytes(content[end : end + 4], "big"):
             raise DataError(
-                f"{path}: the checksum of the part {kind!r} at byte {at} is wrong: the PNG file is damaged"
+                f"{where}: the checksum of its part {kind!r} at byte {at} is wrong: it is damaged"
             )
         at = end + 4
