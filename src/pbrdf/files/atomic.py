@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import ctypes
 import errno
+import itertools
 import os
 import re
 import secrets
@@ -181,11 +182,15 @@ def _workspace(path: Path) -> Iterator[Path]:
     while True:
         space = _name_beside(path)
         space.mkdir()
-        lock = _lock(space)
-        # another process may have taken it for a left one before it was locked
-        if lock is None or _is_there(lock, space):
+        # another process may take it for a left one before it is locked, and remove it
+        try:
+            lock = _lock(space)
+        except BlockingIOError:
+            continue
+        if space.exists() if lock is None else _is_there(lock, space):
             break
-        os.close(lock)
+        if lock is not None:
+            os.close(lock)
     try:
         yield space
     finally:
@@ -228,7 +233,8 @@ def _clear_up(path: Path) -> None:
     """Remove what killed processes left beside `path`, and put back what one of them had moved aside."""
     ours = re.compile(rf"\.{re.escape(path.name)}\.[0-9a-f]{{8}}\.tmp")
     try:
-        left = [entry for entry in os.scandir(path.parent) if ours.fullmatch(entry.name)]
+        with os.scandir(path.parent) as entries:
+            left = [entry for entry in entries if ours.fullmatch(entry.name)]
     except OSError:
         return
     for entry in left:
@@ -309,7 +315,9 @@ def _links(old: Path, new: Path) -> bool:
 
     def fill(source: Path, target: Path) -> None:
         nonlocal left
-        for entry in os.scandir(source):
+        with os.scandir(source) as entries:
+            found = list(itertools.islice(entries, left + 1))
+        for entry in found:
             left -= 1
             if left < 0:
                 raise OSError(errno.EMLINK, "too many")

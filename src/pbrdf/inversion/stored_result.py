@@ -18,6 +18,7 @@ import numpy as np
 
 from pbrdf.data.formats.stored import from_stored, to_stored
 from pbrdf.errors import DataError, ModelError
+from pbrdf.files.atomic import require_whole
 from pbrdf.files.netcdf_files import load_netcdf, write_netcdf_file
 from pbrdf.inversion.estimates import DistinctOptimum, Estimate
 from pbrdf.inversion.holdout import HoldOut, Prediction
@@ -95,12 +96,13 @@ def load_fit(folder: str | os.PathLike[str]) -> FitResult:
     Raises
     ------
     DataError
-        If there is no fit, or the file cannot be read.
+        If there is no fit, the file cannot be read, or files of another fit are mixed with those of this one.
     ModelError
         If it is of a model that is not known here: register it first.
     """
     path = Path(folder)
     if path.is_dir():
+        require_whole(path)
         path /= FILE_NAME
     if not path.is_file():
         raise DataError(f"{path}: there is no such file; give the folder that a fit was saved in")
