@@ -6,6 +6,7 @@ from typing import Annotated
 
 from pbrdf.cli.options import data_argument, with_reading_options
 from pbrdf.cli.reading import Reading
+from pbrdf.errors import visible
 
 __all__ = ["check"]
 
@@ -25,9 +26,9 @@ def check(
 
     dataset = reading.open(file)
     for line in describe(dataset):
-        print(line)
+        print(visible(line))
     issues = issues_of(dataset)
     for issue in issues:
-        print(f"{issue.severity}: {issue}")
+        print(visible(f"{issue.severity}: {issue}"))
     if not issues:
         print("Nothing is wrong with it.")

@@ -34,7 +34,7 @@ from pbrdf.data.schema import (
     std_name,
     variable_dims,
 )
-from pbrdf.errors import DataError
+from pbrdf.errors import DataError, visible
 from pbrdf.optics.stokes import STOKES
 
 __all__ = ["Issue", "check", "validate"]
@@ -72,7 +72,7 @@ class Issue:
     rows: tuple[int, ...] = ()
 
     def __str__(self) -> str:
-        return self.message
+        return visible(self.message)
 
 
 @dataclass(frozen=True)
