@@ -129,12 +129,14 @@ def test_a_model_name_of_the_wrong_type(name):
         load_model({"model": name, "parameters": PAINT})
 
 
-@pytest.mark.parametrize("value", [True, [0.1, True], "0.1", "1_0", {"a": 1}, None])
+@pytest.mark.parametrize("value", [True, [0.1, True], "0.1", "1_0", {"a": 1}, None, [1.0, [1.0]]])
 def test_what_is_no_number_in_json_is_none_of_a_parameter(value):
     with pytest.raises(ModelError, match="sigma"):
         load_model({"model": "double-gauss", "parameters": {**PAINT, "sigma": value}})
     with pytest.raises(ModelError, match="sigma"):
         load_model(json.dumps({"model": "double-gauss", "parameters": {**PAINT, "sigma": value}}))
+    with pytest.raises(ModelError, match=r"\bn\b"):
+        load_model({"model": "double-gauss", "parameters": {**PAINT, "n": value}})
 
 
 @pytest.mark.parametrize("text", ['{"model": ' + "[" * 100_000, '{"model": ' + "9" * 5000 + "}"])
