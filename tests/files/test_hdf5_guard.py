@@ -53,7 +53,7 @@ def test_a_sound_file_passes_and_the_next_one_by_the_same_process(written):
     path = written(lambda file: file.create_dataset("a", data=np.arange(6.0).reshape(2, 3)))
     look(path)
     child = hdf5_guard._process.child
-    look(path, values=False)
+    look(path, loaded=False)
     assert hdf5_guard._process.child is child
     assert child.poll() is None
     assert declared_bytes(str(path), ("/",)) == 48
@@ -116,7 +116,7 @@ def test_more_than_there_is_memory_for_is_refused(written, monkeypatch):
     monkeypatch.setattr(hdf5_guard, "available_memory", lambda: 5000)
     with pytest.raises(DataError, match=r"its variables take 8 kB of memory, of which 5 kB are left"):
         look(path)
-    look(path, values=False)
+    look(path, loaded=False)
 
 
 def test_the_memory_that_is_left_is_that_of_the_system():

@@ -97,23 +97,23 @@ class Look:
         The file.
     groups
         Names of its groups, ``"/"`` for the root.
-    values
-        Whether all numbers are going to be read.
+    loaded
+        Whether all of it is going to be in memory.
     kind
         What the file should be, for messages.
     """
 
     def __init__(
-        self, path: Path, groups: Sequence[str] = ("/",), *, values: bool = True, kind: str = "netCDF"
+        self, path: Path, groups: Sequence[str] = ("/",), *, loaded: bool = True, kind: str = "netCDF"
     ) -> None:
-        self._path, self._groups, self._values, self._kind = path, list(groups), values, kind
+        self._path, self._groups, self._loaded, self._kind = path, list(groups), loaded, kind
         self._answers: list[str] = []
         self._waiting: threading.Thread | None = None
         _process.lock.acquire()
         try:
             child = _process.start()
             if child is not None and child.stdin is not None and child.stdout is not None:
-                request = {"path": str(path.resolve()), "groups": self._groups, "values": values}
+                request = {"path": str(path.resolve()), "groups": self._groups}
                 with suppress(OSError):  # it has ended: there will be no answer
                     child.stdin.write(json.dumps(request) + "\n")
                     child.stdin.flush()
@@ -139,7 +139,7 @@ class Look:
             declared = self._declared()
         finally:
             _process.lock.release()
-        if self._values and declared > (available := available_memory()):
+        if self._loaded and declared > (available := available_memory()):
             raise DataError(
                 f"{self._path}: its variables take {amount(declared)} of memory, of which {amount(available)} are left"
             )

@@ -1,6 +1,6 @@
 """A first look at an HDF5 file, made in a process of its own: what it declares, and whether the library survives it.
 
-Run as a script it answers requests, one line of JSON each, until its input ends: ``{"path", "groups", "values"}`` gives
+Run as a script it answers requests, one line of JSON each, until its input ends: ``{"path", "groups"}`` gives
 ``{"declared": bytes}``, ``{"refused": sentence}`` or ``{"failed": sentence}``. It imports nothing of this package, so
 that it starts quickly; :mod:`pbrdf.files.hdf5_guard` starts it, asks it, and ends it when it does not answer.
 
@@ -34,7 +34,7 @@ class RefusedError(Exception):
     """The file declares what it cannot hold, or keeps it elsewhere."""
 
 
-def look(path: str, groups: Sequence[str], values: bool) -> int:
+def look(path: str, groups: Sequence[str]) -> int:
     """Check what groups of a file declare, then read it as netCDF.
 
     Parameters
@@ -43,8 +43,6 @@ def look(path: str, groups: Sequence[str], values: bool) -> int:
         The file.
     groups
         Names of the groups, ``"/"`` for the root.
-    values
-        Whether to read numbers as well; attributes are read in any case.
 
     Returns
     -------
@@ -68,13 +66,12 @@ def look(path: str, groups: Sequence[str], values: bool) -> int:
             for variable in group.variables.values():
                 dict(variable.attrs)
                 _ = variable.dimensions, variable.dtype, variable.shape
-                if values:
-                    _read(variable)
+                _read(variable)
     return total
 
 
 def _read(variable: Any) -> None:
-    """Read all values, in pieces."""
+    """Read all values, in pieces, unless they are very many."""
     if not variable.shape:
         variable[...]
         return
@@ -194,7 +191,7 @@ def serve(requests: TextIO, answers: TextIO) -> None:
         asked = json.loads(line)
         _limit_memory()
         try:
-            answer: dict[str, Any] = {"declared": look(asked["path"], asked["groups"], asked["values"])}
+            answer: dict[str, Any] = {"declared": look(asked["path"], asked["groups"])}
         except RefusedError as error:
             answer = {"refused": str(error)}
         except MemoryError:

@@ -61,7 +61,7 @@ def load_netcdf(
 
 def open_netcdf(path: Path, **options: Any) -> xr.Dataset:
     """A netCDF file whose numbers are read when they are asked for; otherwise as :func:`load_netcdf`."""
-    look = _begun(path, ("/",), "netCDF", values=False)
+    look = _begun(path, ("/",), "netCDF", loaded=False)
     import xarray as xr
 
     look.require_sound()
@@ -71,13 +71,13 @@ def open_netcdf(path: Path, **options: Any) -> xr.Dataset:
         raise _unreadable(path, "netCDF", error) from error
 
 
-def _begun(path: Path, groups: Sequence[str], kind: str, *, values: bool = True) -> Look:
+def _begun(path: Path, groups: Sequence[str], kind: str, *, loaded: bool = True) -> Look:
     try:
         with path.open("rb"):
             pass
     except OSError as error:
         raise DataError(f"{path}: cannot be read: {error.strerror or error}") from error
-    return Look(path, groups, values=values, kind=kind)
+    return Look(path, groups, loaded=loaded, kind=kind)
 
 
 def _unreadable(path: Path, kind: str, error: Exception) -> DataError:
