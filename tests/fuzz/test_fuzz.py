@@ -21,6 +21,7 @@ def folder(tmp_path_factory):
     return place
 
 
+@pytest.mark.slow
 def test_every_reader_and_every_other_input_is_a_kind_and_its_seeds_are_read(folder):
     found = {kind.name: kind for kind in kinds(folder)}
     assert {*format_names(), "analyser map", "instrument", "regions", "model", "frames"} <= {*found}
@@ -29,6 +30,7 @@ def test_every_reader_and_every_other_input_is_a_kind_and_its_seeds_are_read(fol
             assert classify(Kind(name, (seed,), kind.read), seed)[0] == "read", (name, seed.name)
 
 
+@pytest.mark.slow
 def test_a_reader_without_a_seed_is_given_those_of_the_others(folder, monkeypatch):
     from pbrdf.data import readers
     from pbrdf.data.formats.declaration import Reader
@@ -72,6 +74,7 @@ def test_inputs_are_shared_out_over_the_kinds():
     assert names[:100] == [kind.name for kind in plan(every, 100)]
 
 
+@pytest.mark.slow
 def test_some_hundred_damaged_inputs_are_read_or_refused(folder):
     """Text in this process; what a library reads that may not survive it, in `make fuzz`."""
     chosen = [kind for kind in kinds(folder) if kind.name in _IN_THIS_PROCESS]
@@ -122,13 +125,14 @@ def test_a_reader_that_ends_the_process_or_does_not_end_is_counted(folder, monke
     assert "died: input 0" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_folders_are_damaged_as_a_whole(tmp_path):
     seed = tmp_path / "seed.zarr"
     (seed / "a").mkdir(parents=True)
     (seed / "a" / "0").write_bytes(bytes(100))
     (seed / ".zgroup").write_text('{"zarr_format": 2}', encoding="utf-8")
     states = set()
-    for number in range(60):
+    for number in range(25):
         place = tmp_path / str(number)
         place.mkdir()
         copy = damaged_copy(seed, place, random.Random(number))

@@ -3,8 +3,8 @@
 Some damaged files make the HDF5 library crash, run without end or ask for all memory, and no check from outside finds
 all of those. So every file is read once by a process beside, :mod:`pbrdf.files.hdf5_probe`, which has a deadline and a
 limit of memory; only what it survives is read here. The process starts with the first file, while this one still
-imports what it needs, and stays for the next: the first file takes 0.1 s longer by it, any further one some
-milliseconds. Files that this package wrote are no exception: they may have been damaged since.
+imports what it needs, and stays for the next: the first file takes some 0.2 s longer by it, any further one some
+hundredths. Files that this package wrote are no exception: they may have been damaged since.
 """
 
 from __future__ import annotations
