@@ -195,8 +195,12 @@ def _attributes(ds: xr.Dataset) -> Iterator[Issue]:
                 f"the attribute {name} cannot be stored ({value!r}); use text, finite numbers or lists of "
                 "these",
             )
-    for sentence in attrs.get("assumptions", ()):
-        yield _warning("assumptions", str(sentence))
+    assumptions = attrs.get("assumptions", ())
+    if isinstance(assumptions, list | tuple) and all(isinstance(sentence, str) for sentence in assumptions):
+        for sentence in assumptions:
+            yield _warning("assumptions", sentence)
+    else:
+        yield _error("assumptions", f"the attribute assumptions is {assumptions!r}, not a list of sentences")
 
 
 def _illumination(value: Any) -> Iterator[Issue]:

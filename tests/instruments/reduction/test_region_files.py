@@ -121,7 +121,13 @@ def test_another_kind_of_file(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "text", ["rectangle = [true, 5, 1, 4]", 'rectangle = ["1_0", 50, 1, 4]', 'labels = "a.png"\nvalue = true']
+    "text",
+    [
+        "rectangle = [true, 5, 1, 4]",
+        "rectangle = [1" + "0" * 400 + ", 5, 1, 4]",
+        'rectangle = ["1_0", 50, 1, 4]',
+        'labels = "a.png"\nvalue = true',
+    ],
 )
 def test_what_is_no_number_is_no_edge(tmp_path, text):
     (tmp_path / "roi.toml").write_text(f"[a]\n{text}\n", encoding="utf-8")

@@ -69,7 +69,10 @@ def _refuse(text: str) -> Region:
 def _finite(number: str | float) -> float:
     if isinstance(number, bool):
         raise ValueError
-    value = number_from_text(number) if isinstance(number, str) else float(number)
+    try:
+        value = number_from_text(number) if isinstance(number, str) else float(number)
+    except OverflowError:
+        raise ValueError from None
     if not math.isfinite(value):
         raise ValueError
     return value
