@@ -186,7 +186,7 @@ class _Table:
 
     def number(self, key: str, default: float | None = None) -> float:
         value = self.content.get(key, default)
-        if not _is_number(value):
+        if not isinstance(value, int | float) or not _is_number(value):
             raise self.wrong(key, "a number")
         return float(value)
 
