@@ -8,6 +8,7 @@ else the package reads is named in :func:`kinds`.
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ import numpy as np
 
 import pbrdf
 from pbrdf.data import readers
+from pbrdf.errors import PbrdfError
 
 __all__ = ["READER_SEEDS", "Kind", "kinds", "write_seeds"]
 
@@ -24,14 +26,16 @@ Maker = Callable[[Path], Any]
 
 @dataclass(frozen=True)
 class Kind:
-    """Attributes: its name, whole inputs, how one is read, its share of the inputs relative to others, and whether
-    an infinite number in it is a fault (what was not measured has an infinite uncertainty in a stored fit)."""
+    """Attributes: its name, whole inputs, how one is read, its share of the inputs relative to others, whether an
+    infinite number in it is a fault (what was not measured has an infinite uncertainty in a stored fit), and whether
+    its seeds are its own, which it reads."""
 
     name: str
     seeds: tuple[Path, ...]
     read: Callable[[Path], Any]
     share: float = 1.0
     finite: bool = True
+    whole: bool = True
 
 
 def _dataset(rows: int = 6, **more: Any) -> Any:
@@ -123,9 +127,10 @@ def write_seeds(folder: Path, *, fit: bool = True) -> None:
         places = _reader_seeds(name, folder)
         if name in READER_SEEDS:
             READER_SEEDS[name][1](places[0])
-        elif places:
-            readers.write(_dataset(std={"I": 0.01}), places[0])
-            readers.write(_mueller(), places[1])
+        for place, dataset in zip(places, (_dataset(std={"I": 0.01}), _mueller()), strict=False):
+            with suppress(PbrdfError):  # not every format holds both
+                if name not in READER_SEEDS:
+                    readers.write(dataset, place)
     vectors = np.array([[0.5, 0.5, 0, 0], [0.5, -0.5, 0, 0], [0.5, 0, 0.5, 0], [0.5, 0, 0, 0.5]])
     for suffix in (".csv", ".nc"):
         write_analyzer(measured(vectors), folder / f"analyser{suffix}")
@@ -185,10 +190,19 @@ def kinds(folder: Path) -> list[Kind]:
         opened = open_grid(path, ("a", "b"))
         return opened.read(0, 0, min(opened.rows, 1000))
 
-    seeds = {name: _reader_seeds(name, folder) for name in readers.format_names()}
+    seeds = {
+        name: tuple(path for path in _reader_seeds(name, folder) if path.exists())
+        for name in readers.format_names()
+    }
     every = tuple(p for name, paths in seeds.items() for p in paths if p.is_file() and name not in _SHARES)
     found = [
-        Kind(name, paths or every, readers._of_name(folder, name).read, _SHARES.get(name, 1.0))
+        Kind(
+            name,
+            paths or every,
+            readers._of_name(folder, name).read,
+            _SHARES.get(name, 1.0),
+            whole=bool(paths),
+        )
         for name, paths in seeds.items()
     ]
     table: tuple[tuple[str, tuple[str, ...], Callable[[Path], Any]], ...] = (

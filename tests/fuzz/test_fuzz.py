@@ -24,9 +24,12 @@ def folder(tmp_path_factory):
 @pytest.mark.slow
 def test_every_reader_and_every_other_input_is_a_kind_and_its_seeds_are_read(folder):
     found = {kind.name: kind for kind in kinds(folder)}
+    assert all(
+        found[name].whole for name in ("csv", "netcdf", "zarr", "scatmech", "cornell", "pbsdf", "merl")
+    )
     assert {*format_names(), "analyser map", "instrument", "regions", "model", "frames"} <= {*found}
     for name, kind in found.items():
-        for seed in kind.seeds:
+        for seed in kind.seeds if kind.whole else ():
             assert classify(Kind(name, (seed,), kind.read), seed)[0] == "read", (name, seed.name)
 
 
@@ -37,6 +40,7 @@ def test_a_reader_without_a_seed_is_given_those_of_the_others(folder, monkeypatc
 
     monkeypatch.setattr(readers, "_registered", {"own": Reader("own", lambda path: None, (".own",))})
     (own,) = (kind for kind in kinds(folder) if kind.name == "own")
+    assert not own.whole
     assert {seed.suffix for seed in own.seeds} >= {".csv", ".nc", ".brdf"}
 
 
