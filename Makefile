@@ -10,7 +10,7 @@ TEST_STAMP := $(VENV)/.installed-dev
 # one process a core: threads of NumPy's linear algebra beside them would wait for each other
 PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --dist worksteal
 
-.PHONY: demo test quick lint benchmark clean
+.PHONY: demo test quick lint benchmark fuzz clean
 
 demo: $(STAMP)
 	$(BIN)/pbrdf reproduce --output demo
@@ -37,6 +37,10 @@ benchmark: $(TEST_STAMP)
 	$(BIN)/python benchmarks/domain.py
 	$(BIN)/python benchmarks/domain.py --single
 	$(BIN)/python benchmarks/read_csv.py
+
+# 20 000 damaged inputs of every kind: none may end in anything but data or a sentence (about a quarter of an hour)
+fuzz: $(TEST_STAMP)
+	$(BIN)/python tests/fuzz/fuzz_run.py --count 20000
 
 $(VENV)/bin/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \

@@ -154,3 +154,22 @@ def test_the_angle_of_a_model_is_not_for_data(run, refused, tmp_path):
     run("convert", "white", "data.csv")
     assert "--theta-i is for models" in refused("plot", "data.csv", "--theta-i", "20")
     assert "this is the file to draw" in refused("plot", "data.csv", "-o", "data.csv")
+
+
+@pytest.mark.parametrize(
+    "given", [["--starts", "1_0"], ["--starts=٣"], ["--wavelength", "55_0"], ["--seed", "１"]]
+)
+def test_an_option_that_is_a_number_takes_no_other_spelling(refused, given):
+    assert "is not a number" in refused("fit", "data.csv", *given)
+
+
+def test_control_characters_of_a_title_do_not_reach_the_terminal(run, tmp_path):
+    import pbrdf
+
+    title = "white\x1b]0;mine\x07 \x1b[2J"
+    data = pbrdf.make_dataset(0.1, 0.2, 0.0, quantity="brdf", I=1.0, attrs={"title": title})
+    pbrdf.write(data, tmp_path / "data.nc")
+    shown = run("check", "data.nc").stdout
+    assert "\x1b" not in shown
+    assert shown.startswith("white\\x1b]0;mine\\x07 \\x1b[2J\n")
+    assert pbrdf.read(tmp_path / "data.nc").attrs["title"] == title

@@ -50,3 +50,9 @@ def test_wrong_texts_are_named(read, given):
 def test_other_texts_are_no_shares(text):
     with pytest.raises(PbrdfError, match="--x"):
         share(text, "--x")
+
+
+@pytest.mark.parametrize("text", ["1_0", "٣"])
+def test_what_only_python_takes_for_a_number_is_none(text):
+    with pytest.raises(PbrdfError, match=r"--x: .* is not a number"):
+        number(text, "--x")

@@ -127,3 +127,22 @@ def test_files_that_cannot_be_read(tmp_path):
 def test_a_model_name_of_the_wrong_type(name):
     with pytest.raises(ModelError, match="unknown model"):
         load_model({"model": name, "parameters": PAINT})
+
+
+@pytest.mark.parametrize("value", [True, [0.1, True], "0.1", "1_0", {"a": 1}, None, [1.0, [1.0]]])
+def test_what_is_no_number_in_json_is_none_of_a_parameter(value):
+    with pytest.raises(ModelError, match="sigma"):
+        load_model({"model": "double-gauss", "parameters": {**PAINT, "sigma": value}})
+    with pytest.raises(ModelError, match="sigma"):
+        load_model(json.dumps({"model": "double-gauss", "parameters": {**PAINT, "sigma": value}}))
+    with pytest.raises(ModelError, match=r"\bn\b"):
+        load_model({"model": "double-gauss", "parameters": {**PAINT, "n": value}})
+
+
+@pytest.mark.parametrize("text", ['{"model": ' + "[" * 100_000, '{"model": ' + "9" * 5000 + "}"])
+def test_json_that_python_cannot_take_is_refused_in_a_sentence(tmp_path, text):
+    (tmp_path / "a.json").write_text(text, encoding="utf-8")
+    with pytest.raises(
+        ModelError, match=r"a\.json: not JSON, (brackets stand too deep|an integer has more digits)"
+    ):
+        load_model(tmp_path / "a.json")

@@ -6,6 +6,7 @@ from typing import Annotated
 
 from pbrdf.cli.options import data_argument, with_reading_options
 from pbrdf.cli.reading import Reading
+from pbrdf.errors import visible
 
 __all__ = ["check"]
 
@@ -25,11 +26,11 @@ def check(
 
     dataset = reading.open(file, say=False)
     for line in describe(dataset):
-        print(line)
+        print(visible(line))
     for i, line in enumerate(columns_in_words(dataset)):
-        print(line if i else f"columns: {line}")
+        print(visible(line if i else f"columns: {line}"))
     issues = issues_of(dataset)
     for issue in issues:
-        print(f"{issue.severity}: {on_the_command_line(str(issue))}")
+        print(visible(f"{issue.severity}: {on_the_command_line(str(issue))}"))
     if not issues:
         print("Nothing is wrong with it.")

@@ -6,7 +6,7 @@ import shlex
 from collections.abc import Sequence
 from contextvars import ContextVar
 
-__all__ = ["command_line", "remember_arguments"]
+__all__ = ["command_line", "given_arguments", "remember_arguments"]
 
 _arguments: ContextVar[tuple[str, ...]] = ContextVar("arguments", default=())
 
@@ -14,6 +14,11 @@ _arguments: ContextVar[tuple[str, ...]] = ContextVar("arguments", default=())
 def remember_arguments(arguments: Sequence[str]) -> None:
     """Keep the arguments of the whole program, as they came."""
     _arguments.set(tuple(arguments))
+
+
+def given_arguments() -> tuple[str, ...]:
+    """The arguments of the whole program."""
+    return _arguments.get()
 
 
 def command_line() -> str:

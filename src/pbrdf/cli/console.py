@@ -9,6 +9,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
+from pbrdf.errors import visible
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -32,19 +34,19 @@ def reading_width() -> int | None:
 
 def output_console() -> Console:
     """A console for results; a pipe or a file gets plain text."""
-    from rich.console import Console
+    from pbrdf.report.printing import printing_console
 
-    return Console(width=reading_width(), highlight=False, soft_wrap=False)
+    return printing_console(width=reading_width(), soft_wrap=False)
 
 
 def fail(message: str) -> None:
     """Write one line about an error."""
-    print(f"pbrdf: error: {message}", file=sys.stderr)
+    print(f"pbrdf: error: {visible(message)}", file=sys.stderr)
 
 
 def warn(message: str) -> None:
     """Write one line that a user should see but that stops nothing."""
-    print(f"pbrdf: {message}", file=sys.stderr)
+    print(f"pbrdf: {visible(message)}", file=sys.stderr)
 
 
 #: Where standard error is no terminal, a line of progress comes after so many seconds, and again after as many.

@@ -18,7 +18,7 @@ from typer.core import TyperGroup
 
 from pbrdf.cli.calibrate import calibrate
 from pbrdf.cli.check import check
-from pbrdf.cli.command_line import remember_arguments
+from pbrdf.cli.command_line import given_arguments, remember_arguments
 from pbrdf.cli.compare import compare
 from pbrdf.cli.console import fail, warn
 from pbrdf.cli.convert import convert
@@ -36,6 +36,7 @@ from pbrdf.cli.reduce import reduce
 from pbrdf.cli.render import render
 from pbrdf.cli.reproduce import reproduce
 from pbrdf.cli.simulate import simulate
+from pbrdf.cli.values import refuse_odd_numbers
 from pbrdf.errors import PbrdfError, PluginWarning
 from pbrdf.version import __version__
 
@@ -55,6 +56,7 @@ class _Commands(TyperGroup):
     def invoke(self, ctx: Any) -> Any:
         try:
             with _plugin_warnings_in_lines():
+                refuse_odd_numbers(self.commands, given_arguments())
                 return super().invoke(ctx)
         except KeyboardInterrupt:
             fail("interrupted")

@@ -3,12 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from pbrdf.errors import PbrdfError
+from pbrdf.files.plain_numbers import number_from_text
 
-__all__ = ["angles", "bounds", "number", "numbers", "pairs", "require_folder_of", "share", "stokes_vector"]
+__all__ = [
+    "angles",
+    "bounds",
+    "number",
+    "numbers",
+    "pairs",
+    "refuse_odd_numbers",
+    "require_folder_of",
+    "share",
+    "stokes_vector",
+]
 
 #: More values than this in one list are a slip of the pen.
 _MOST_VALUES = 100_000
@@ -23,12 +35,61 @@ def number(text: str, option: str) -> float:
         If it is none; names the option.
     """
     try:
-        value = float(text)
+        value = number_from_text(text)
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
         raise PbrdfError(f"{option}: {text!r} is not a number")
     return value
+
+
+def refuse_odd_numbers(commands: Mapping[str, Any], arguments: Sequence[str]) -> None:
+    """Refuse what Python takes for a number but nobody else, as the value of an option that is one.
+
+    Parameters
+    ----------
+    commands
+        Commands by name; their options say by their annotation, or by the name of their type, that they are numbers.
+    arguments
+        Of the whole program.
+
+    Raises
+    ------
+    PbrdfError
+        Names the option.
+    """
+    name = next((argument for argument in arguments if argument in commands), None)
+    numeric = {
+        option
+        for parameter in (commands[name].params if name is not None else ())
+        if _is_number(parameter)
+        for option in parameter.opts
+    }
+    for option, following in zip(arguments, [*arguments[1:], ""], strict=True):
+        option, sign, value = option.partition("=")
+        if option in numeric:
+            value = value if sign else following
+            if _is_odd(value):
+                raise PbrdfError(f"{option}: {value!r} is not a number")
+
+
+def _is_odd(text: str) -> bool:
+    """Whether Python alone takes a text for a number; what is none at all is told where it is taken."""
+    try:
+        float(text)
+    except ValueError:
+        return False
+    try:
+        number_from_text(text)
+    except ValueError:
+        return True
+    return False
+
+
+def _is_number(parameter: Any) -> bool:
+    annotation = getattr(getattr(parameter, "type_descriptor", None), "annotation", None)
+    kind = str(getattr(getattr(parameter, "type", None), "name", ""))
+    return annotation in (int, float, list[int], list[float]) or kind.startswith(("integer", "float"))
 
 
 def share(text: str, option: str) -> float:

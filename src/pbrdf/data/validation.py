@@ -40,7 +40,7 @@ from pbrdf.data.schema import (
     std_name,
     variable_dims,
 )
-from pbrdf.errors import DataError
+from pbrdf.errors import DataError, visible
 from pbrdf.optics.stokes import STOKES
 
 __all__ = ["Issue", "check", "validate"]
@@ -80,7 +80,7 @@ class Issue:
     rows: tuple[int, ...] = ()
 
     def __str__(self) -> str:
-        return self.message
+        return visible(self.message)
 
 
 @dataclass(frozen=True)
@@ -221,8 +221,12 @@ def _attributes(ds: xr.Dataset) -> Iterator[Issue]:
                 f"the attribute {name} cannot be stored ({value!r}); use text, finite numbers or lists of "
                 "these",
             )
-    for sentence in attrs.get("assumptions", ()):
-        yield _warning("assumptions", str(sentence))
+    assumptions = attrs.get("assumptions", ())
+    if isinstance(assumptions, list | tuple) and all(isinstance(sentence, str) for sentence in assumptions):
+        for sentence in assumptions:
+            yield _warning("assumptions", sentence)
+    else:
+        yield _error("assumptions", f"the attribute assumptions is {assumptions!r}, not a list of sentences")
 
 
 def _illumination(value: Any) -> Iterator[Issue]:

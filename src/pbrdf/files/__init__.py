@@ -1,1 +1,1 @@
-"""Files as such, whatever they hold: written whole or not at all, text, tables of delimited columns."""
+"""Files as such, whatever they hold: written whole or not at all, text, tables, netCDF read under guard."""

@@ -7,11 +7,11 @@ else Windows-1252, of which Latin-1 is a part (°, µ). A file with bytes that n
 from __future__ import annotations
 
 import codecs
-import tomllib
 from pathlib import Path
 from typing import Any
 
 from pbrdf.errors import DataError
+from pbrdf.files.plain_numbers import toml_from_text
 
 __all__ = ["first_bytes", "lines_of", "read_bytes", "read_lines", "read_toml", "utf8"]
 
@@ -123,8 +123,10 @@ def read_toml(path: Path) -> dict[str, Any]:
         line = error.object[: error.start].count(b"\n") + 1
         raise DataError(f"{path}: line {line}: not UTF-8 text; save the file as UTF-8") from error
     try:
-        return tomllib.loads("\n".join(lines_of(text)))
-    except tomllib.TOMLDecodeError as error:
+        return toml_from_text("\n".join(lines_of(text)))
+    except DataError:
+        raise
+    except ValueError as error:
         raise DataError(f"{path}: not a TOML file: {error}") from error
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pbrdf.errors import FitError
+from pbrdf.files.plain_numbers import number_from_text
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -98,7 +99,7 @@ class HoldOut:
 
     def _number(self, text: str) -> float:
         try:
-            return float(text)
+            return number_from_text(text)
         except ValueError:
             raise FitError(f"hold-out {self}: {text!r} is not a number") from None
 

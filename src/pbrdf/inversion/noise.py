@@ -10,6 +10,7 @@ import numpy as np
 
 from pbrdf.data.schema import is_ratio
 from pbrdf.errors import FitError
+from pbrdf.files.plain_numbers import number_from_text
 
 __all__ = ["EqualNoise", "InstrumentNoise", "Noise", "NoiseModel", "parse_noise"]
 
@@ -86,7 +87,9 @@ class NoiseModel:
         try:
             if not 1 <= len(parts) <= 2:
                 raise ValueError
-            numbers = [float(p[:-1]) / 100.0 if p.endswith("%") else float(p) for p in parts]
+            numbers = [
+                number_from_text(p[:-1]) / 100.0 if p.endswith("%") else number_from_text(p) for p in parts
+            ]
         except ValueError:
             raise FitError(
                 f"noise {text!r}: give RELATIVE or RELATIVE,ABSOLUTE, for example 0.02,0.001 or 2%,0.1%"
@@ -204,7 +207,9 @@ def parse_noise(text: str) -> Noise:
         try:
             if not sign or name.strip() not in ("linear", "circular", "read", "quantum"):
                 raise ValueError
-            values[name.strip()] = float(number[:-1]) / 100.0 if number.endswith("%") else float(number)
+            values[name.strip()] = (
+                number_from_text(number[:-1]) / 100.0 if number.endswith("%") else number_from_text(number)
+            )
         except ValueError:
             raise FitError(
                 f"noise {text!r}: give instrument:linear=1%,circular=5%,read=0.5,quantum=1 or some of these"

@@ -22,6 +22,7 @@ import math
 from dataclasses import dataclass
 
 from pbrdf.errors import FitError
+from pbrdf.files.plain_numbers import number_from_text
 from pbrdf.models.parameters import Parameter
 
 __all__ = ["KINDS", "Nuisance", "parse_prior"]
@@ -103,7 +104,7 @@ def parse_prior(where: str, text: str) -> tuple[float, float]:
         If the text is not two numbers, the second above 0.
     """
     try:
-        mean, std = (float(part) for part in text.split(","))
+        mean, std = (number_from_text(part) for part in text.split(","))
     except ValueError:
         raise FitError(f"{where}: a prior is MEAN,STD, for example 1.5,0.05") from None
     check_prior(where, (mean, std))

@@ -18,6 +18,8 @@ import numpy as np
 
 from pbrdf.data.formats.stored import from_stored, to_stored
 from pbrdf.errors import DataError, ModelError
+from pbrdf.files.atomic import require_whole
+from pbrdf.files.netcdf_files import load_netcdf, write_netcdf_file
 from pbrdf.inversion.estimates import DistinctOptimum, Estimate
 from pbrdf.inversion.holdout import HoldOut, Prediction
 from pbrdf.inversion.observations import Observations
@@ -72,12 +74,10 @@ def write_result(result: FitResult, path: Path) -> None:
         "title": f"{result.model.name} fitted",
         "fit": json.dumps(_record(result), ensure_ascii=False),
     }
-    arrays.to_netcdf(path, engine="h5netcdf")
     comparison = result.comparison.copy()
     for name in [str(n) for n in comparison.data_vars if comparison[n].dtype == bool]:
         comparison[name] = comparison[name].astype(np.int8).assign_attrs(flag="1 is true")
-    comparison.to_netcdf(path, mode="a", group="comparison", engine="h5netcdf")
-    to_stored(result.dataset).to_netcdf(path, mode="a", group="data", engine="h5netcdf")
+    write_netcdf_file(path, {"/": arrays, "comparison": comparison, "data": to_stored(result.dataset)})
 
 
 def load_fit(folder: str | os.PathLike[str]) -> FitResult:
@@ -96,12 +96,13 @@ def load_fit(folder: str | os.PathLike[str]) -> FitResult:
     Raises
     ------
     DataError
-        If there is no fit, or the file cannot be read.
+        If there is no fit, the file cannot be read, or files of another fit are mixed with those of this one.
     ModelError
         If it is of a model that is not known here: register it first.
     """
     path = Path(folder)
     if path.is_dir():
+        require_whole(path)
         path /= FILE_NAME
     if not path.is_file():
         raise DataError(f"{path}: there is no such file; give the folder that a fit was saved in")
@@ -118,15 +119,10 @@ def read_result(path: Path) -> FitResult:
     ModelError
         If it is of a model that is not known here.
     """
-    import xarray as xr
-
+    arrays, comparison, dataset = load_netcdf(
+        path, ("/", "comparison", "data"), kind="a fit", decode_times=False
+    )
     try:
-        with (
-            xr.open_dataset(path, engine="h5netcdf") as stored,
-            xr.open_dataset(path, engine="h5netcdf", group="comparison") as compared,
-            xr.open_dataset(path, engine="h5netcdf", group="data", decode_times=False) as measured,
-        ):
-            arrays, comparison, dataset = stored.load(), compared.load(), measured.load()
         record = json.loads(arrays.attrs["fit"])
         if record["format"] != FORMAT:
             raise DataError(
@@ -135,12 +131,11 @@ def read_result(path: Path) -> FitResult:
         return _result(record, arrays, comparison, from_stored(dataset, path))
     except ModelError as error:
         raise ModelError(f"{path}: {error}") from error
-    except OSError as error:
-        raise DataError(f"{path}: cannot be read as a fit: {error.strerror or error}") from error
-    except (KeyError, TypeError, ValueError) as error:
-        if isinstance(error, DataError):
-            raise
-        raise DataError(f"{path}: this is not the file of a fit: {error}") from error
+    except DataError:
+        raise
+    except Exception as error:  # a record of another shape fails anywhere
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise DataError(f"{path}: this is not the file of a fit, or a damaged one: {reason}") from error
 
 
 def _record(result: FitResult) -> dict[str, Any]:

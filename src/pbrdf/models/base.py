@@ -360,7 +360,7 @@ def _documentation(cls: type[Model]) -> str:
 
 def _split_index(index: str, extinction: str, n: Any, kappa: Any) -> tuple[Any, Any]:
     """Split a complex index n − iκ into (n, κ); a real one keeps the κ given apart."""
-    if is_drjit(n) or not np.iscomplexobj(n):
+    if is_drjit(n) or not _is_complex(n):
         return n, kappa
     if np.any(np.imag(n) != 0.0) and np.any(np.asarray(kappa) != 0.0):
         raise ModelError(
@@ -371,6 +371,13 @@ def _split_index(index: str, extinction: str, n: Any, kappa: Any) -> tuple[Any, 
             f"{index}={n}: the imaginary part must be ≤ 0, the convention is n − iκ with κ ≥ 0; give the conjugate"
         )
     return n.real, (-n.imag if np.any(np.imag(n) != 0.0) else kappa)
+
+
+def _is_complex(value: Any) -> bool:
+    try:
+        return np.iscomplexobj(value)
+    except ValueError:  # rows of different lengths, which are refused where values are checked
+        return False
 
 
 def _checked_part(part: str) -> str:
@@ -388,8 +395,10 @@ def _checked_value(parameter: Parameter, value: Any) -> Any:
         numbers = drjit_to_numpy(value)
     else:
         try:
+            if np.asarray(value).dtype.kind in "bSU":  # NumPy would make numbers of true, and of "1_0"
+                raise TypeError
             numbers = np.asarray(value, dtype=float)
-        except (TypeError, ValueError) as error:
+        except (TypeError, ValueError, OverflowError) as error:
             raise ModelError(f"{parameter.name}={value!r} is not a number") from error
         if numbers.size == 0:
             raise ModelError(f"{parameter.name} is an empty array: give a number or an array of numbers")

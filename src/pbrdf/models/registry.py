@@ -9,7 +9,6 @@ A package offers its models in the entry-point group ``pbrdf.models``::
 from __future__ import annotations
 
 import importlib.metadata
-import json
 import os
 import sys
 import warnings
@@ -19,6 +18,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from pbrdf.errors import ModelError, PluginWarning
+from pbrdf.files.plain_numbers import json_from_text
 from pbrdf.models.base import Model
 
 __all__ = ["ENTRY_POINTS", "MODELS", "Registry", "find_model", "load_model", "model_from_file", "register"]
@@ -196,11 +196,9 @@ def load_model(source: str | os.PathLike[str] | Mapping[str, Any]) -> Model:
             except OSError as error:
                 raise ModelError(f"{where}cannot be read as a model: {error}") from error
         try:
-            content = json.loads(text)
-        except json.JSONDecodeError as error:
-            raise ModelError(
-                f"{where}not JSON, line {error.lineno} column {error.colno}: {error.msg}"
-            ) from error
+            content = json_from_text(text)
+        except ValueError as error:
+            raise ModelError(f"{where}not JSON, {error}") from error
     if not isinstance(content, Mapping) or "model" not in content:
         raise ModelError(f'{where}not a model: the key "model" is missing')
     cls = MODELS.get(content["model"]) if isinstance(content["model"], str) else None
@@ -223,7 +221,17 @@ def load_model(source: str | os.PathLike[str] | Mapping[str, Any]) -> Model:
     if missing:
         raise ModelError(f"{where}parameter {missing[0]!r} of {cls.name} is missing")
     values = {p.name: parameters.get(p.name, p.default) for p in cls.parameters}
+    for name, value in values.items():
+        if _has_truth(value):
+            raise ModelError(f"{where}{name} is true or false, not a number")
     try:
         return cls.from_values(values, **options)
     except ModelError as error:
         raise ModelError(f"{where}{error}") from error
+
+
+def _has_truth(value: Any) -> bool:
+    """Whether there is a true or false among numbers, which Python would take for 1 or 0."""
+    if isinstance(value, list):
+        return any(map(_has_truth, value))
+    return isinstance(value, bool)

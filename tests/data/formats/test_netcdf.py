@@ -90,3 +90,33 @@ def test_invalid_data_are_not_written(tmp_path):
     with pytest.raises(DataError, match="theta_i"):
         write_netcdf(ds, tmp_path / "data.nc")
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (
+            lambda ds: ds["theta_i"].attrs.update(units=[1.0, 2.0]),
+            r"the units .* of theta_i are not understood",
+        ),
+        (lambda ds: ds.attrs.update(note="json:{"), "the attribute note is not JSON, line 1 column 2"),
+        (
+            lambda ds: ds.attrs.update(note="json:" + "[" * 50_000),
+            "the attribute note is not JSON, brackets stand",
+        ),
+        (lambda ds: ds.update({"phi": ("geometry", ["a"])}), r"phi"),
+        (lambda ds: ds.update({"wavelength": ("geometry", ["a"])}), r"wavelength"),
+        (lambda ds: ds.attrs.update(quantity=[1, 2]), "the attribute quantity is"),
+        (
+            lambda ds: ds.attrs.update(assumptions=3),
+            "the attribute assumptions is 3, not a list of sentences",
+        ),
+        (lambda ds: ds.attrs.update(simulated=[0, 1]), "the attribute simulated is"),
+    ],
+)
+def test_what_another_program_stores_in_another_form_is_named(tmp_path, change, words):
+    ds = make_dataset(0.1, 0.2, 0.0, quantity="brdf", I=1.0)
+    change(ds)
+    ds.to_netcdf(tmp_path / "data.nc", engine="h5netcdf")
+    with pytest.raises(DataError, match=rf"data\.nc.*{words}"):
+        read_netcdf(tmp_path / "data.nc")

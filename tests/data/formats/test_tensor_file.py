@@ -106,3 +106,12 @@ def test_a_failed_write_leaves_the_old_file_alone(file, monkeypatch):
 def test_a_missing_folder_is_told(tmp_path):
     with pytest.raises(DataError, match="cannot be written"):
         write_tensors(ARRAYS, tmp_path / "nowhere" / "a.tensor")
+
+
+@pytest.mark.parametrize("shape", [(2**40,), (2**63, 0), (1,) * 40])
+def test_a_shape_that_no_array_has_is_damage(tmp_path, shape):
+    head = struct.pack("<12s2BI", b"tensor_file\0", 1, 0, 1) + struct.pack("<H", 1) + b"a"
+    file = tmp_path / "a.tensor"
+    file.write_bytes(head + struct.pack(f"<HBQ{len(shape)}Q", len(shape), 1, 0, *shape))
+    with pytest.raises(DataError, match=r"a\.tensor: the field 'a' has the shape .*: the file is damaged"):
+        read_tensors(file)

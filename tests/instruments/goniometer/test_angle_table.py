@@ -110,6 +110,8 @@ def test_rows_of_some_series_in_their_order():
         ("series,theta_i,theta_r,exposure\na,9,2,0", "series 'a': exposure is 0, it must be more than 0"),
         ("# azimuth: backward=0\nseries,theta_i,theta_r\na,9,2", "use forward=0 or forward=180"),
         ("# angles: gon\nseries,theta_i,theta_r\na,9,2", "angles is 'gon'; use degrees or radians"),
+        ("series,theta_i,theta_r,sample_angle\na,9,2,1e999", "series 'a': sample_angle is infinite"),
+        ("series,theta_i,theta_r,wavelength\na,9,2,inf", "series 'a': wavelength is infinite"),
         ("series,theta_i,theta_r\n", "there are no rows"),
         ("series,theta_i,theta_r,theta_i_deg\na,1,2,3", "two columns are called theta_i"),
     ],

@@ -426,3 +426,23 @@ def test_instruments_out_of_range():
         replace(preset("paper"), reference_angle=np.inf)
     with pytest.raises(DataError, match="stability"):
         replace(preset("paper"), stability=-0.1)
+
+
+@pytest.mark.parametrize("number", ["1e308", "1" + "0" * 400, "inf", "nan", "true", '"1_0"'])
+@pytest.mark.parametrize("line", ["angles = [0, 45, {}]", "diattenuation = {}", "reference_angle = {}"])
+def test_what_is_no_number_of_an_instrument_is_named(tmp_path, line, number):
+    key = line.split()[0]
+    lines = ["[polarimeter]", 'kind = "rotating_polarizer"', line.format(number)]
+    if key != "angles":
+        lines.append("angles = [0, 45, 90]")
+    (tmp_path / "a.toml").write_text("\n".join(lines), encoding="utf-8")
+    with pytest.raises(DataError, match=rf"a\.toml: \[polarimeter\] {key} is .*: give a "):
+        load_instrument(tmp_path / "a.toml")
+
+
+@pytest.mark.parametrize("number", ["1" + "0" * 400, "true", "1e308"])
+def test_what_is_no_number_of_a_detector_is_named(tmp_path, number):
+    text = f'[polarimeter]\nkind = "preset"\npreset = "paper"\n[detector]\ngain = {number}\n'
+    (tmp_path / "a.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(DataError, match=r"a\.toml: \[detector\] gain is .*: give a number"):
+        load_instrument(tmp_path / "a.toml")

@@ -118,3 +118,20 @@ def test_a_picture_of_labels(tmp_path):
 def test_another_kind_of_file(tmp_path):
     with pytest.raises(DataError, match=r"regions are read from \.toml, \.csv and other tables"):
         read_regions(tmp_path / "roi.json")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "rectangle = [true, 5, 1, 4]",
+        "rectangle = [1" + "0" * 400 + ", 5, 1, 4]",
+        'rectangle = ["1_0", 50, 1, 4]',
+        'labels = "a.png"\nvalue = true',
+    ],
+)
+def test_what_is_no_number_is_no_edge(tmp_path, text):
+    (tmp_path / "roi.toml").write_text(f"[a]\n{text}\n", encoding="utf-8")
+    with pytest.raises(DataError, match=r"roi\.toml: region 'a': give rectangle"):
+        read_regions(tmp_path / "roi.toml")
+    with pytest.raises(DataError, match="is no region"):
+        region_from_text("1_0:20,1:4")

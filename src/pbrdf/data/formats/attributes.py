@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from pbrdf.data.schema import TEXT_ATTRIBUTES
+from pbrdf.files.plain_numbers import json_from_text
 
 __all__ = ["decode_attribute", "encode_attribute", "plain_attributes"]
 
@@ -50,7 +51,7 @@ def decode_attribute(name: str, text: str) -> Any:
     )
     if looks_like_json:
         try:
-            return json.loads(text)
-        except json.JSONDecodeError:
+            return json_from_text(text)
+        except ValueError:
             return text
     return text

@@ -20,6 +20,7 @@ from pbrdf.data.formats.declaration import Reader
 from pbrdf.data.select import match_wavelengths
 from pbrdf.data.validation import validate
 from pbrdf.errors import DataError
+from pbrdf.files.plain_numbers import number_from_text
 from pbrdf.files.text import read_lines
 
 __all__ = ["READER", "read_cornell"]
@@ -53,7 +54,7 @@ def read_cornell(path: str | Path, *, wavelength: float | Sequence[float] | None
     for line, content in enumerate(text, start=1):
         for cell in content.partition("#")[0].split():
             try:
-                numbers.append(float(cell))
+                numbers.append(number_from_text(cell))
             except ValueError:
                 raise DataError(f"{path}: line {line}: {cell!r} is not a number") from None
             lines.append(line)

@@ -3,21 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Final
 
 import xarray as xr
 
 from pbrdf.data.formats.declaration import Reader
 from pbrdf.data.formats.stored import from_stored, to_stored
-from pbrdf.errors import DataError
 from pbrdf.files.atomic import atomic_file
+from pbrdf.files.netcdf_files import SIGNATURE, load_netcdf, write_netcdf_file
 from pbrdf.files.text import first_bytes
 
 __all__ = ["READER", "read_netcdf", "write_netcdf"]
-
-_ENGINE: Final = "h5netcdf"
-#: How HDF5 files begin, of which netCDF-4 is a kind.
-_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 
 def read_netcdf(path: str | Path) -> xr.Dataset:
@@ -39,11 +34,7 @@ def read_netcdf(path: str | Path) -> xr.Dataset:
         If it is not a netCDF file or does not follow the schema.
     """
     path = Path(path)
-    try:
-        with xr.open_dataset(path, engine=_ENGINE, decode_times=False) as file:
-            stored = file.load()
-    except (OSError, ValueError) as error:
-        raise DataError(f"{path}: cannot be read as netCDF: {error}") from error
+    (stored,) = load_netcdf(path, decode_times=False)
     return from_stored(stored, path)
 
 
@@ -66,11 +57,11 @@ def write_netcdf(ds: xr.Dataset, path: str | Path) -> None:
     """
     stored = to_stored(ds)
     with atomic_file(Path(path)) as target:
-        stored.to_netcdf(target, engine=_ENGINE, format="NETCDF4")
+        write_netcdf_file(target, {"/": stored})
 
 
 def _begins_as_hdf5(path: Path) -> bool:
-    return first_bytes(path, len(_SIGNATURE)) == _SIGNATURE
+    return first_bytes(path, len(SIGNATURE)) == SIGNATURE
 
 
 READER = Reader(

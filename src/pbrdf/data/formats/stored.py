@@ -30,6 +30,7 @@ from pbrdf.data.schema import (
 )
 from pbrdf.data.validation import validate
 from pbrdf.errors import DataError
+from pbrdf.files.plain_numbers import json_from_text
 
 __all__ = ["from_stored", "to_stored"]
 
@@ -66,7 +67,12 @@ def from_stored(stored: xr.Dataset, path: Path) -> xr.Dataset:
         If a unit is not understood or the content does not follow the schema.
     """
     known = {*COORDINATES, *VARIABLES, *map(std_name, VARIABLES), COVARIANCE, *STOKES_AXES}
-    attrs = {name: _attribute_from_stored(value) for name, value in plain_attributes(stored.attrs).items()}
+    attrs = {}
+    for name, value in plain_attributes(stored.attrs).items():
+        try:
+            attrs[name] = _attribute_from_stored(value)
+        except ValueError as error:
+            raise DataError(f"{path}: the attribute {name} is not JSON, {error}") from error
     ignored = sorted(str(name) for name in stored.variables if name not in known)
     if ignored:
         attrs["ignored_variables"] = ignored
@@ -75,13 +81,18 @@ def from_stored(stored: xr.Dataset, path: Path) -> xr.Dataset:
     for name in sorted(known & set(map(str, stored.variables))):
         array = stored[name]
         target = coords if name in stored.coords or name in COORDINATES else data
-        if name == "group":
-            target[name] = (array.dims, group_labels(array.values))
-        elif name in STOKES_AXES:
-            target[name] = (array.dims, array.values.astype(np.str_))
-        else:
-            units = {"units": variable_units(name, attrs.get("quantity", ""))}
-            target[name] = (array.dims, _from_file_units(path, name, array), units)
+        try:
+            if name == "group":
+                target[name] = (array.dims, group_labels(array.values))
+            elif name in STOKES_AXES:
+                target[name] = (array.dims, array.values.astype(np.str_))
+            else:
+                units = {"units": variable_units(name, str(attrs.get("quantity", "")))}
+                target[name] = (array.dims, _from_file_units(path, name, array), units)
+        except DataError:
+            raise
+        except (TypeError, ValueError) as error:
+            raise DataError(f"{path}: {name} cannot be used as it is stored: {error}") from error
     ds = xr.Dataset(data, coords, attrs)
     validate(ds, origin=str(path))
     return ds
@@ -93,7 +104,7 @@ def _from_file_units(path: Path, name: str, array: xr.DataArray) -> NDArray[Any]
         return values
     table: Mapping[str, float] = _ANGLE_UNITS if name in ANGLES else _NANOMETRES
     units = array.attrs.get("units", "rad" if name in ANGLES else "nm")
-    if units not in table:
+    if not isinstance(units, str) or units not in table:
         raise DataError(f"{path}: the units {units!r} of {name} are not understood; use {', '.join(table)}")
     if name in ANGLES:
         return np.deg2rad(values) if table[units] else values
@@ -130,5 +141,7 @@ def _attribute_to_stored(value: Any) -> Any:
 
 def _attribute_from_stored(value: Any) -> Any:
     return (
-        json.loads(value.removeprefix(_JSON)) if isinstance(value, str) and value.startswith(_JSON) else value
+        json_from_text(value.removeprefix(_JSON))
+        if isinstance(value, str) and value.startswith(_JSON)
+        else value
     )

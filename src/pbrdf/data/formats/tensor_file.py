@@ -28,6 +28,8 @@ _HEADER = struct.Struct("<12s2BI")
 #: The enumeration of Mitsuba's ``Struct::Type``, from 1.
 _TYPES = ("u1", "i1", "<u2", "<i2", "<u4", "<i4", "<u8", "<i8", "<f2", "<f4", "<f8")
 _ALIGNMENT = 8
+#: More than an array can have in any version of NumPy are damage.
+_MOST_DIMENSIONS = 32
 
 
 def is_tensor_file(path: Path) -> bool:
@@ -51,6 +53,8 @@ def read_tensors(path: Path) -> dict[str, NDArray[Any]]:
         raise DataError(f"{path}: cannot be read: {error.strerror or error}") from error
     arrays: dict[str, NDArray[Any]] = {}
     for name, (kind, offset, shape) in fields.items():
+        if len(shape) > _MOST_DIMENSIONS or max(shape, default=0) > size:
+            raise DataError(f"{path}: the field {name!r} has the shape {shape}: the file is damaged")
         stop = offset + kind.itemsize * math.prod(shape)
         if stop > size:
             raise DataError(

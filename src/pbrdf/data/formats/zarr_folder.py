@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import importlib.util
 from pathlib import Path
+from typing import Any
 
 import xarray as xr
 
@@ -14,8 +15,9 @@ from pbrdf.data.formats.declaration import Reader
 from pbrdf.data.formats.stored import from_stored, to_stored
 from pbrdf.errors import DataError
 from pbrdf.files.atomic import atomic_folder
+from pbrdf.files.zarr_chunks import require_complete
 
-__all__ = ["READER", "read_zarr", "require_zarr", "write_zarr"]
+__all__ = ["READER", "open_zarr", "read_zarr", "require_zarr", "write_zarr"]
 
 #: A folder with one of these in it is a group of Zarr arrays.
 _MARKS = (".zgroup", ".zmetadata", "zarr.json")
@@ -40,15 +42,45 @@ def read_zarr(path: str | Path) -> xr.Dataset:
         If zarr is not installed, the folder is not one of Zarr, or it does not follow the schema.
     """
     path = Path(path)
+    with open_zarr(path, loaded=True, decode_times=False) as file:
+        try:
+            stored = file.load()
+        except Exception as error:  # decoders raise anything over a damaged chunk
+            raise _unreadable(path, error) from error
+    return from_stored(stored, path)
+
+
+def open_zarr(path: Path, *, loaded: bool = False, **options: Any) -> xr.Dataset:
+    """A Zarr folder whose numbers are read when they are asked for.
+
+    Parameters
+    ----------
+    path
+        The folder.
+    loaded
+        Whether all of it is going to be in memory.
+    **options
+        Of :func:`xarray.open_dataset`.
+
+    Raises
+    ------
+    DataError
+        If zarr is not installed, the folder is not one of Zarr, or an array or a chunk of it is missing or cut off.
+    """
     require_zarr(path)
     if not _is_group(path):
         raise DataError(f"{path}: this is not a Zarr folder: it holds no {' or '.join(_MARKS)}")
+    require_complete(path, loaded=loaded)
     try:
-        with xr.open_dataset(path, engine="zarr", consolidated=False, decode_times=False) as file:
-            stored = file.load()
-    except (OSError, ValueError, KeyError) as error:
-        raise DataError(f"{path}: cannot be read as Zarr: {error}") from error
-    return from_stored(stored, path)
+        return xr.open_dataset(path, engine="zarr", consolidated=False, **options)
+    except Exception as error:  # the library raises anything over damaged metadata
+        raise _unreadable(path, error) from error
+
+
+def _unreadable(path: Path, error: Exception) -> DataError:
+    return DataError(
+        f"{path}: cannot be read as Zarr: {' '.join(str(error).split()) or type(error).__name__}"
+    )
 
 
 def write_zarr(ds: xr.Dataset, path: str | Path) -> None:
@@ -75,7 +107,8 @@ def write_zarr(ds: xr.Dataset, path: str | Path) -> None:
         raise DataError(f"{path}: there is something else of that name, which is left alone; choose another")
     stored = to_stored(ds)
     with atomic_folder(path) as target:
-        stored.to_zarr(target, mode="w", zarr_format=2, consolidated=True)
+        # a chunk that is left out because it is all fill value could not be told from one that was lost
+        stored.to_zarr(target, mode="w", zarr_format=2, consolidated=True, write_empty_chunks=True)
 
 
 def _is_group(path: Path) -> bool:

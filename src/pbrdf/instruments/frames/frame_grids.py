@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pbrdf.data.formats.zarr_folder import require_zarr
+from pbrdf.data.formats.zarr_folder import open_zarr
 from pbrdf.errors import DataError
+from pbrdf.files.netcdf_files import open_netcdf
 from pbrdf.instruments.frames.frames import named, require_raw
 
 if TYPE_CHECKING:
@@ -67,7 +68,7 @@ class GriddedFrames:
         order = tuple(dim for dim in ("repeat", "state", "y", "x") if dim in part.dims)
         try:
             values = part.transpose(*order).values
-        except (OSError, RuntimeError, ValueError) as error:
+        except Exception as error:  # the libraries raise anything over a damaged file
             raise DataError(f"{self.path}: cannot be read: {error}") from error
         return values if "state" in part.dims else values[..., np.newaxis, :, :]
 
@@ -92,16 +93,8 @@ def open_grid(path: Path, states: Sequence[str]) -> GriddedFrames:
     DataError
         If zarr is missing, the file cannot be read, or it does not hold such frames.
     """
-    import xarray as xr
-
-    options: dict[str, Any] = {"engine": "h5netcdf"}
-    if path.suffix.lower() == ".zarr":
-        require_zarr(path)
-        options = {"engine": "zarr", "consolidated": False}
-    try:
-        file = xr.open_dataset(path, mask_and_scale=False, decode_times=False, cache=False, **options)
-    except (OSError, ValueError, KeyError) as error:
-        raise DataError(f"{path}: cannot be read: {error}") from error
+    opened = open_zarr if path.suffix.lower() == ".zarr" else open_netcdf
+    file = opened(path, mask_and_scale=False, decode_times=False, cache=False)
     frames = _variable(path, file)
     require_raw(frames.dtype, f"{path}: the variable {frames.name}", means=True)
     names = _labels(frames, "series") if "series" in frames.dims else (path.stem,)

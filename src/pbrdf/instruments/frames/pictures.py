@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from pbrdf.errors import DataError
+from pbrdf.instruments.frames.picture_checks import require_checksums, require_possible
 
 __all__ = ["SUFFIXES", "PictureFile", "open_pictures"]
 
@@ -77,6 +78,7 @@ class PictureFile:
                 index = np.unravel_index(picture, self.shape[:-2])
                 return np.array(array[(*index, slice(first_row, last_row))])
             if kind == ".png":
+                require_checksums(self.path)
                 return _decoded(self.path, 0)[first_row:last_row]
             if self.offset:
                 page = np.memmap(self.path, self.dtype, "r", self.offset[picture], self.shape[-2:])
@@ -101,10 +103,10 @@ def open_pictures(path: Path) -> PictureFile:
             if array.ndim < 2 or 0 in array.shape:
                 raise DataError(f"{path}: an array of the shape {array.shape} is no picture")
             return PictureFile(path, array.shape, array.dtype)
-        if kind == ".png":
-            return _open_png(path)
-        if kind in (".tif", ".tiff"):
-            return _open_tiff(path)
+        if kind in (".png", ".tif", ".tiff"):
+            picture = _open_png(path) if kind == ".png" else _open_tiff(path)
+            require_possible(path, picture.shape, picture.dtype)
+            return picture
     raise DataError(f"{path}: pictures are read from {', '.join(SUFFIXES)} files")
 
 

@@ -106,6 +106,11 @@ class AngleTable:
                     f"angle table: {field} has the shape {array.shape}, not {len(names)} values"
                 ) from None
             object.__setattr__(self, field, array)
+        for field in _MAY_BE_EMPTY:
+            values = getattr(self, field)
+            bad = np.flatnonzero(np.isinf(values)) if values is not None else np.array([], dtype=int)
+            if bad.size:
+                raise DataError(f"angle table: series {names[bad[0]]!r}: {field} is infinite")
         for field, low, high, need in (
             ("theta_i", 0.0, np.pi / 2, "from 0° to below 90°"),
             ("theta_r", 0.0, np.pi / 2, "from 0° to below 90°"),

@@ -9,6 +9,7 @@ import numpy as np
 from pbrdf.errors import DataError
 from pbrdf.files.atomic import atomic_file
 from pbrdf.files.delimited import TABLE_EXTENSIONS, read_table, write_table
+from pbrdf.files.netcdf_files import load_netcdf, write_netcdf_file
 from pbrdf.instruments.polarimeter.polarimeter import Polarimeter, measured
 from pbrdf.optics.stokes import STOKES
 
@@ -68,7 +69,7 @@ def write_analyzer(polarimeter: Polarimeter, path: str | Path) -> None:
             {"title": "analyser vectors W, intensity = W·(I, Q, U, V); x towards y, V > 0 left circular"},
         )
         with atomic_file(path) as target:
-            stored.to_netcdf(target, engine="h5netcdf", format="NETCDF4")
+            write_netcdf_file(target, {"/": stored})
     elif path.suffix.lower() == ".csv" and not polarimeter.is_map:
         rows = zip(polarimeter.states, polarimeter.analyzer.tolist(), strict=True)
         write_table(path, ["state", *_COLUMNS], ([name, *map(repr, w)] for name, w in rows))
@@ -86,13 +87,7 @@ def _read_csv(path: Path) -> tuple[np.ndarray, list[str] | None]:
 
 
 def _read_netcdf(path: Path) -> tuple[np.ndarray, list[str] | None]:
-    import xarray as xr
-
-    try:
-        with xr.open_dataset(path, engine="h5netcdf") as file:
-            stored = file.load()
-    except (OSError, ValueError) as error:
-        raise DataError(f"{path}: cannot be read as netCDF: {error}") from error
+    (stored,) = load_netcdf(path, decode_times=False)
     if "analyzer" not in stored:
         raise DataError(f"{path}: there is no variable 'analyzer'")
     array = stored["analyzer"]

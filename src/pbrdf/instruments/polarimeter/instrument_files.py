@@ -61,6 +61,8 @@ _KINDS: dict[str, tuple[str, ...]] = {
 }
 _BAND = ("shape", "center", "width", "file", "reference", "birefringence")
 _DETECTOR = ("bits", "gain", "read_noise", "offset", "dark", "full_well", "full_scale", "alignment")
+#: No number of an instrument is as large; in radians or squared, a larger one could become infinite.
+_LARGEST = 1e100
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
 
@@ -219,7 +221,7 @@ class _Table:
 
     def number(self, key: str, default: float | None = None) -> float:
         value = self.content.get(key, default)
-        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        if not isinstance(value, int | float) or not _is_number(value):
             raise self.wrong(key, "a number")
         return float(value)
 
@@ -232,7 +234,7 @@ class _Table:
             array = np.array(value, dtype=float)
         except ValueError:
             raise self.wrong(key, f"{need}, all rows of the same length") from None
-        if array.ndim != ndim or not np.isfinite(array).all():
+        if array.ndim != ndim:
             raise self.wrong(key, need)
         return array
 
@@ -246,7 +248,7 @@ def _leaves(value: Any) -> Iterable[Any]:
 
 
 def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < _LARGEST
 
 
 def _polarimeter(table: _Table, kind: str) -> Polarimeter:

@@ -12,7 +12,8 @@ from __future__ import annotations
 
 import json
 import shutil
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,7 @@ import xarray as xr
 from pbrdf.data.formats.csv_table.columns import COVARIANCES
 from pbrdf.data.formats.zarr_folder import require_zarr
 from pbrdf.errors import DataError
+from pbrdf.files.netcdf_files import PatientFile, write_netcdf_file
 from pbrdf.instruments.frames.frames import Frames
 from pbrdf.instruments.goniometer.angle_table import AngleTable
 from pbrdf.instruments.polarimeter.instrument import Instrument
@@ -124,12 +126,14 @@ class MapWriter:
         self._buffers: dict[str, np.ndarray] = {}
         self._variables: dict[str, Any] = {}
         self._file: Any = None
+        self._target: PatientFile | None = None
 
     def __enter__(self) -> MapWriter:
         if self._path.exists():
             raise DataError(f"{self._path}: there is something of that name already")
         try:
-            self._create()
+            with self._written():
+                self._create()
         except BaseException:
             self._remove()
             raise
@@ -140,12 +144,16 @@ class MapWriter:
         if self._kind == ".nc":
             import h5netcdf
 
-            self._head.to_netcdf(self._path, engine="h5netcdf")
-            self._file = h5netcdf.File(self._path, "a")
+            write_netcdf_file(self._path, {"/": self._head})
+            self._target = PatientFile(self._path)
+            self._file = h5netcdf.File(self._target, "a")
         else:
             import zarr
 
-            self._head.to_zarr(self._path, mode="w-", zarr_format=2, consolidated=False)
+            # a chunk of nothing but bad pixels is written as well: one that is not there was lost
+            self._head.to_zarr(
+                self._path, mode="w-", zarr_format=2, consolidated=False, write_empty_chunks=True
+            )
             self._file = zarr.open_group(self._path, mode="r+", zarr_format=2)
         self._variables = {name: self._variable(name) for name in self.names}
         self._buffers = {name: np.empty(self._chunk_shape[1:], _type(name)) for name in self.names}
@@ -155,7 +163,7 @@ class MapWriter:
 
             self._file.close()
             # rows come in order: one chunk of each variable has to be kept, not the usual megabytes
-            self._file = h5py.File(self._path, "r+", rdcc_nbytes=2 * _CHUNK)
+            self._file = h5py.File(self._target, "r+", rdcc_nbytes=2 * _CHUNK)
             self._variables = {name: self._file[name] for name in self.names}
 
     def _variable(self, name: str) -> Any:
@@ -168,7 +176,12 @@ class MapWriter:
             variable = self._file.create_variable(name, dims, dtype, chunks=self._chunk_shape, fillvalue=fill)
         else:
             variable = self._file.create_array(
-                name, shape=self._shape, chunks=self._chunk_shape, dtype=dtype, fill_value=fill
+                name,
+                shape=self._shape,
+                chunks=self._chunk_shape,
+                dtype=dtype,
+                fill_value=fill,
+                config={"write_empty_chunks": True},
             )
             attributes = {**attributes, "_ARRAY_DIMENSIONS": list(dims)}
         for key, value in attributes.items():
@@ -216,7 +229,8 @@ class MapWriter:
             for name, buffer in self._buffers.items():
                 buffer[row - start : row - start + taken] = part[name][done : done + taken]
                 if row + taken == end:
-                    self._variables[name][block.series, start:end, :] = buffer[: end - start]
+                    with self._written():
+                        self._variables[name][block.series, start:end, :] = buffer[: end - start]
             done += taken
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
@@ -228,9 +242,21 @@ class MapWriter:
         if kind is not None:
             self._remove()
 
+    @contextmanager
+    def _written(self) -> Iterator[None]:
+        """Raise what the disk has to say, in place of what the library makes of it."""
+        try:
+            yield
+        finally:
+            if self._target is not None:
+                self._target.require_written()
+
     def _close(self) -> None:
-        if hasattr(self._file, "close"):
-            self._file.close()
+        with self._written():
+            if hasattr(self._file, "close"):
+                self._file.close()
+            if self._target is not None:
+                self._target.close()
 
     def _remove(self) -> None:
         """Leave nothing half-written."""

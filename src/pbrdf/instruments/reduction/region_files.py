@@ -28,6 +28,7 @@ import numpy as np
 
 from pbrdf.errors import DataError
 from pbrdf.files.delimited import TABLE_EXTENSIONS, read_table
+from pbrdf.files.plain_numbers import number_from_text
 from pbrdf.files.text import read_toml
 from pbrdf.instruments.frames.pictures import SUFFIXES, open_pictures
 from pbrdf.instruments.reduction.regions import Ellipse, LabelRegion, Polygon, Rectangle, Region
@@ -66,7 +67,12 @@ def _refuse(text: str) -> Region:
 
 
 def _finite(number: str | float) -> float:
-    value = float(number)
+    if isinstance(number, bool):
+        raise ValueError
+    try:
+        value = number_from_text(number) if isinstance(number, str) else float(number)
+    except OverflowError:
+        raise ValueError from None
     if not math.isfinite(value):
         raise ValueError
     return value
@@ -135,7 +141,7 @@ def _from_table(table: Any, folder: Path) -> Region:
         return Ellipse(x, y, rx, ry)
     if keys == {"polygon"}:
         return _polygon(table["polygon"])
-    if keys == {"labels", "value"} and isinstance(table["value"], int):
+    if keys == {"labels", "value"} and type(table["value"]) is int:
         return LabelRegion(_labels(folder / table["labels"]), table["value"])
     raise ValueError
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from pbrdf.report.comparison.subject import Compared, table
 from pbrdf.report.dataset.describe import short_name
-from pbrdf.report.printing import bare_table, print_parts
+from pbrdf.report.printing import bare_table, print_parts, printing_console
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
@@ -20,10 +20,8 @@ _TEXT_WIDTH = 140
 
 def summary_text(report: Compared) -> str:
     """The summary as plain text, for a file."""
-    from rich.console import Console
-
     file = io.StringIO()
-    console = Console(file=file, width=_TEXT_WIDTH, highlight=False, color_system=None, force_terminal=False)
+    console = printing_console(file=file, width=_TEXT_WIDTH, color_system=None, force_terminal=False)
     print_summary(report, console)
     return "\n".join(line.rstrip() for line in file.getvalue().splitlines()) + "\n"
 

@@ -13,6 +13,7 @@ from pbrdf.data.covariance import correlations
 from pbrdf.data.origin import origin_of
 from pbrdf.data.schema import COVARIANCE, NATURAL_LIGHT, NORMALISED, only_ratios, written
 from pbrdf.data.select import measured_channels
+from pbrdf.errors import visible
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -38,7 +39,7 @@ _QUANTITIES = {
 
 def describe(ds: xr.Dataset) -> list[str]:
     """Lines that say what a data set holds: geometries, channels, ranges of the angles, light."""
-    lines = [f"{ds.attrs['title']}"] if ds.attrs.get("title") else []
+    lines = [visible(" ".join(str(ds.attrs["title"]).split()))] if ds.attrs.get("title") else []
     channels = measured_channels(ds)
     uncertain = [name for name in channels if f"{name}_std" in ds.data_vars]
     groups = np.unique(ds["group"].values)
@@ -115,6 +116,7 @@ def cautions(ds: xr.Dataset) -> list[str]:
     sentences += [on_the_command_line(s) for s in (origin.remarks if origin else ())]
     if skipped := ds.attrs.get("skipped_rows"):
         sentences.append(f"{skipped} rows without a usable measurement were left out.")
+    sentences = [*map(visible, sentences)]
     return [s[:1].upper() + s[1:] + ("" if s.endswith(".") else ".") for s in sentences]
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from pbrdf.data.degrees import exact_degrees
 from pbrdf.errors import PbrdfError
 from pbrdf.files.atomic import atomic_folder
+from pbrdf.files.netcdf_files import write_netcdf_file
 from pbrdf.inversion.stored_result import FILE_NAME, write_result
 from pbrdf.report.fit.page import page_text
 from pbrdf.report.fit.subject import Report
@@ -73,7 +74,7 @@ def write_report(
         report.result.model.to_json(temporary / "model.json")
         record = json.dumps(fit_record(report), indent=2, ensure_ascii=False, allow_nan=False)
         (temporary / "fit.json").write_text(record + "\n", encoding="utf-8")
-        comparison_file(report).to_netcdf(temporary / "comparison.nc", engine="h5netcdf")
+        write_netcdf_file(temporary / "comparison.nc", {"/": comparison_file(report)})
         write_result(report.result, temporary / FILE_NAME)
         drawn = _write_figures(report, temporary, formats) if figures else {}
         pictures = [f"{name}.{kind}" for name in drawn for kind in formats]

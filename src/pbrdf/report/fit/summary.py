@@ -22,7 +22,7 @@ from pbrdf.report.dataset.describe import (
 )
 from pbrdf.report.fit.subject import Report
 from pbrdf.report.numbers import brief, per_cent, shown_unit, with_error
-from pbrdf.report.printing import bare_table, print_parts
+from pbrdf.report.printing import bare_table, print_parts, printing_console
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
@@ -65,11 +65,7 @@ _NOTHING_HELD_OUT = (
 
 def summary_text(report: Report, *, verbose: bool = False) -> str:
     """The summary as plain text, for a file."""
-    from rich.console import Console
-
-    console = Console(
-        file=io.StringIO(), width=_TEXT_WIDTH, highlight=False, color_system=None, force_terminal=False
-    )
+    console = printing_console(file=io.StringIO(), width=_TEXT_WIDTH, color_system=None, force_terminal=False)
     print_summary(report, console, verbose=verbose)
     return "\n".join(line.rstrip() for line in console.file.getvalue().splitlines()) + "\n"  # type: ignore[attr-defined]
 

@@ -12,6 +12,7 @@ from pbrdf.data.formats.attributes import decode_attribute
 from pbrdf.data.schema import ATTRIBUTE_NAME, FILE_KEYS, NATURAL_LIGHT, QUANTITIES, TEXT_ATTRIBUTES
 from pbrdf.errors import DataError
 from pbrdf.files.delimited import Table
+from pbrdf.files.plain_numbers import number_from_text
 
 __all__ = ["Header", "statements"]
 
@@ -128,7 +129,7 @@ def _illumination(path: Path, stated: str | Sequence[float]) -> list[float]:
         return list(NATURAL_LIGHT)
     parts = stated.strip("[]() ").split(",") if isinstance(stated, str) else stated
     try:
-        vector = [float(part) for part in parts]
+        vector = [number_from_text(part) if isinstance(part, str) else float(part) for part in parts]
     except (TypeError, ValueError):
         vector = []
     if len(vector) != 4:

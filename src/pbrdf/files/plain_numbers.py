@@ -1,0 +1,54 @@
+"""Numbers as people and instruments write them, and nothing else that Python takes for one.
+
+Python also reads ``1_0`` as 10 and digits of other scripts (``٣``), which in a file or an option are slips. JSON and
+TOML know texts that make Python recurse too deep, and integers too long for it: they are refused in a sentence.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import tomllib
+from collections.abc import Callable
+from typing import Any
+
+__all__ = ["json_from_text", "number_from_text", "toml_from_text"]
+
+_NUMBER = re.compile(r"\s*[-+]?((\d+\.?\d*|\.\d+)(e[-+]?\d+)?|nan|inf|infinity)\s*", re.ASCII | re.IGNORECASE)
+
+
+def number_from_text(text: str) -> float:
+    """The number that a text is; raises ValueError if it is none."""
+    if _NUMBER.fullmatch(text) is None:
+        raise ValueError(f"{text!r} is not a number")
+    return float(text)
+
+
+def json_from_text(text: str | bytes) -> Any:
+    """What a JSON text stands for.
+
+    Raises
+    ------
+    ValueError
+        Says, in a part of a sentence, where and why it is none.
+    """
+    try:
+        return _read(json.loads, text)
+    except json.JSONDecodeError as error:
+        raise ValueError(f"line {error.lineno} column {error.colno}: {error.msg}") from error
+
+
+def toml_from_text(text: str) -> dict[str, Any]:
+    """What a TOML text stands for; raises ValueError as :func:`json_from_text` does."""
+    return _read(tomllib.loads, text)
+
+
+def _read(loads: Callable[[Any], Any], text: str | bytes) -> Any:
+    try:
+        return loads(text)
+    except RecursionError:
+        raise ValueError("brackets stand too deep in each other") from None
+    except ValueError as error:
+        if "integer string conversion" in str(error):
+            raise ValueError("an integer has more digits than a number can have") from None
+        raise

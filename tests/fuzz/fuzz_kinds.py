@@ -1,0 +1,225 @@
+"""What is fuzzed: kinds of input, each with whole files to damage and the function that reads them.
+
+Every reader of data is a kind by itself, one that comes with a package or a later version too: its seed is written by
+its own writer, or by a line in :data:`READER_SEEDS`. A reader with neither is given the seeds of all the others. What
+else the package reads is named in :func:`kinds`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import pbrdf
+from pbrdf.data import readers
+from pbrdf.errors import PbrdfError
+
+__all__ = ["READER_SEEDS", "Kind", "kinds", "write_seeds"]
+
+Maker = Callable[[Path], Any]
+
+
+@dataclass(frozen=True)
+class Kind:
+    """Attributes: its name, whole inputs, how one is read, its share of the inputs relative to others, whether an
+    infinite number in it is a fault (what was not measured has an infinite uncertainty in a stored fit), and whether
+    its seeds are its own, which it reads."""
+
+    name: str
+    seeds: tuple[Path, ...]
+    read: Callable[[Path], Any]
+    share: float = 1.0
+    finite: bool = True
+    whole: bool = True
+
+
+def _dataset(rows: int = 6, **more: Any) -> Any:
+    theta = np.deg2rad(np.linspace(5.0, 60.0, rows))
+    stokes = pbrdf.load_paint("white").stokes(theta, theta, 0.1)
+    channels = {name: stokes[:, i] for i, name in enumerate("IQUV")}
+    return pbrdf.make_dataset(
+        theta, theta, 0.1, quantity="brdf", attrs={"title": "a paint"}, **channels, **more
+    )
+
+
+def _mueller() -> Any:
+    theta = np.deg2rad([10.0, 40.0])
+    return pbrdf.make_dataset(
+        theta,
+        theta,
+        0.0,
+        quantity="brdf",
+        wavelength=550.0,
+        mueller=pbrdf.load_paint("white").mueller(theta, theta),
+    )
+
+
+def _scatmech(path: Path) -> None:
+    names = [f"m{i}{j}" for i in range(1, 5) for j in range(1, 5) if (i, j) != (1, 1)]
+    lines = ["lambda,thetai,phi,thetar,phir,f_r11," + ",".join(names)]
+    lines += [f"0.55,-30,0,{t},0,0.1,{','.join(['0.01'] * 15)}" for t in (10, 20, 30)]
+    path.write_text("\n".join(lines), encoding="utf-8")
+
+
+def _cornell(path: Path) -> None:
+    lines = ["# a paint", "2", "400 500"] + [f"0.5 3.1 {t} 0.0 0.1 0.2" for t in (0.1, 0.2, 0.3)]
+    path.write_text("\n".join(lines), encoding="utf-8")
+
+
+def _pbsdf(path: Path) -> None:
+    from pbrdf.data.formats.tensor_file import write_tensors
+
+    axes = {name: np.linspace(0.0, 1.5, 3, dtype=np.float32)[None] for name in ("theta_h", "theta_d")}
+    axes["phi_d"] = np.linspace(-3.1, 3.1, 5, dtype=np.float32)[None]
+    M = np.broadcast_to(np.eye(4, dtype=np.float32), (5, 3, 3, 2, 4, 4)).copy()
+    write_tensors({**axes, "wvls": np.array([450, 550], dtype=np.uint16), "M": M}, path)
+
+
+def _merl(path: Path) -> None:
+    from pbrdf.data.formats.merl import SHAPE, write_planes
+
+    write_planes(np.full((3, *SHAPE), 0.1), path)
+
+
+#: By the name of a reader that writes nothing: the seed's extension, and a function that writes it.
+READER_SEEDS: dict[str, tuple[str, Maker]] = {
+    "scatmech": (".csv", _scatmech),
+    "cornell": (".brdf", _cornell),
+    "pbsdf": (".pbsdf", _pbsdf),
+    "merl": (".binary", _merl),
+}
+#: Their files are large, and little of them is structure.
+_SHARES = {"merl": 0.02}
+_INSTRUMENTS = ("paper", "sony_imx250mzr")
+
+
+def _reader_seeds(name: str, folder: Path) -> tuple[Path, ...]:
+    """Where the seeds of a reader are."""
+    reader = readers._of_name(folder, name)
+    if name in READER_SEEDS:
+        return (folder / f"{name}{READER_SEEDS[name][0]}",)
+    if reader.write is not None and reader.written:
+        return (folder / f"{name}{reader.written[0]}", folder / f"{name}_mueller{reader.written[0]}")
+    return ()
+
+
+def _text(path: Path, *lines: str) -> None:
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def write_seeds(folder: Path, *, fit: bool = True) -> None:
+    """Write all seeds into a folder; `fit` makes that of a stored fit as well, which takes some seconds."""
+    import xarray as xr
+    from PIL import Image
+
+    from pbrdf.instruments.polarimeter.analyzer_files import write_analyzer
+    from pbrdf.instruments.polarimeter.instrument_files import save_instrument
+    from pbrdf.instruments.polarimeter.polarimeter import measured
+    from pbrdf.instruments.polarimeter.presets import preset
+    from pbrdf.inversion.stored_result import write_result
+
+    for name in readers.format_names():
+        places = _reader_seeds(name, folder)
+        if name in READER_SEEDS:
+            READER_SEEDS[name][1](places[0])
+        for place, dataset in zip(places, (_dataset(std={"I": 0.01}), _mueller()), strict=False):
+            with suppress(PbrdfError):  # not every format holds both
+                if name not in READER_SEEDS:
+                    readers.write(dataset, place)
+    vectors = np.array([[0.5, 0.5, 0, 0], [0.5, -0.5, 0, 0], [0.5, 0, 0.5, 0], [0.5, 0, 0, 0.5]])
+    for suffix in (".csv", ".nc"):
+        write_analyzer(measured(vectors), folder / f"analyser{suffix}")
+    for name in _INSTRUMENTS:
+        save_instrument(preset(name), folder / f"{name}.toml")
+    _text(
+        folder / "band.toml",
+        "[polarimeter]\nkind = 'rotating_retarder'\nangles = [0, 30, 60, 90.5]\nretardance = 132",
+        "accuracy = { linear = 0.01, circular = 0.02 }\nname = 'mine'\nreference_angle = 3",
+        "[polarimeter.band]\nshape = 'gaussian'\ncenter = 550\nwidth = 20\nbirefringence = [0.9, 0.01]",
+        "[detector]\nbits = 12\ngain = 0.5\nread_noise = 3.0\noffset = 10\n[frames]\npattern = 'x.png'",
+    )
+    _text(
+        folder / "regions.toml",
+        "[paint]\nrectangle = [1, 20, 3, 40]\n[disc]\nellipse = [32, 24, 4.5, 3]",
+        "[edge]\npolygon = [[10, 10], [90, 20], [50, 80]]",
+    )
+    _text(folder / "regions.csv", "name,x0,x1,y0,y1", "paint,1,20,3,40", "other,5,8,1,9.5")
+    _text(folder / "light.csv", "series,angle_deg,dop,handedness", "a,0,1,", "b,45,0.9,", "c,,1,left")
+    _text(folder / "stokes.csv", "series,I,Q,U,V,exposure", "a,1,1,0,0,1", "b,1,0,1,0,2", "c,1,0,0,1,1")
+    _text(
+        folder / "angles.csv",
+        "# azimuth: forward=180",
+        "series,theta_i_deg,theta_r_deg,phi_deg,group,wavelength_nm,exposure,sample_angle_deg",
+        "p1,10,50,0,1,476,1,3.5",
+        "p2,12,48,170,1,476,0.5,",
+    )
+    _text(folder / "filter.csv", "wavelength_nm,transmission", "540,0", "550,0.9", "560,0.1")
+    pbrdf.load_paint("white").to_json(folder / "model.json")
+    picture = np.arange(48, dtype=np.uint16).reshape(6, 8)
+    for name in ("picture.png", "picture.tif"):
+        Image.fromarray(picture).save(folder / name)
+    np.save(folder / "picture.npy", picture)
+    frames = xr.Dataset({"frames": (("state", "y", "x"), np.stack([picture] * 2))}, {"state": ["a", "b"]})
+    frames.to_netcdf(folder / "frames.nc", engine="h5netcdf")
+    frames.to_zarr(folder / "frames.zarr", zarr_format=2, consolidated=True, write_empty_chunks=True)
+    if fit:
+        write_result(pbrdf.fit(_dataset(12, std={"I": 0.01}), starts=2), folder / "fit.nc")
+
+
+def kinds(folder: Path) -> list[Kind]:
+    """All kinds whose seeds :func:`write_seeds` has written into a folder."""
+    from pbrdf.instruments.calibration.input_table import read_input_table
+    from pbrdf.instruments.frames.frame_grids import open_grid
+    from pbrdf.instruments.frames.pictures import open_pictures
+    from pbrdf.instruments.goniometer.angle_table import read_angles
+    from pbrdf.instruments.polarimeter.analyzer_files import read_analyzer
+    from pbrdf.instruments.polarimeter.band import read_band
+    from pbrdf.instruments.polarimeter.instrument_files import load_instrument
+    from pbrdf.instruments.reduction.region_files import read_regions
+
+    def picture(path: Path) -> Any:
+        opened = open_pictures(path)
+        return opened.read(0, 0, min(opened.rows, 1000))
+
+    def frames(path: Path) -> Any:
+        opened = open_grid(path, ("a", "b"))
+        return opened.read(0, 0, min(opened.rows, 1000))
+
+    seeds = {
+        name: tuple(path for path in _reader_seeds(name, folder) if path.exists())
+        for name in readers.format_names()
+    }
+    every = tuple(p for name, paths in seeds.items() for p in paths if p.is_file() and name not in _SHARES)
+    found = [
+        Kind(
+            name,
+            paths or every,
+            readers._of_name(folder, name).read,
+            _SHARES.get(name, 1.0),
+            whole=bool(paths),
+        )
+        for name, paths in seeds.items()
+    ]
+    table: tuple[tuple[str, tuple[str, ...], Callable[[Path], Any]], ...] = (
+        ("analyser table", ("analyser.csv",), read_analyzer),
+        ("analyser map", ("analyser.nc",), read_analyzer),
+        ("instrument", (*(f"{name}.toml" for name in _INSTRUMENTS), "band.toml"), load_instrument),
+        ("regions", ("regions.toml", "regions.csv"), read_regions),
+        ("calibration table", ("light.csv", "stokes.csv"), read_input_table),
+        ("angle table", ("angles.csv",), read_angles),
+        ("band", ("filter.csv",), read_band),
+        ("model", ("model.json",), pbrdf.load_model),
+        ("fit", ("fit.nc",), pbrdf.load_fit),
+        ("picture", ("picture.png", "picture.tif", "picture.npy"), picture),
+        ("frames", ("frames.nc", "frames.zarr"), frames),
+    )
+    for name, files, read in table:
+        paths = tuple(folder / file for file in files)
+        if all(path.exists() for path in paths):
+            found.append(Kind(name, paths, read, finite=name != "fit"))
+    return found
