@@ -121,7 +121,7 @@ def test_dolp_outside_its_range_is_a_warning(dolp):
 
 @pytest.mark.parametrize(("q", "std", "reported"), [(0.9, 0.01, False), (1.2, 0.1, False), (1.2, 0.01, True)])
 def test_normalised_parameters_above_one_count_uncertainties(q, std, reported):
-    ds = make_dataset(0.1, 0.5, 0.0, Q_over_I=[0.0, -q], U_over_I=0.1, std={"Q_over_I": std})
+    ds = make_dataset(0.1, [0.4, 0.5], 0.0, Q_over_I=[0.0, -q], U_over_I=0.1, std={"Q_over_I": std})
     issues = check(ds)
     assert bool(issues) == reported
     if reported:
@@ -132,7 +132,7 @@ def test_normalised_parameters_above_one_count_uncertainties(q, std, reported):
 def test_elements_over_m00_above_one_are_a_warning():
     M = np.full((2, 4, 4), np.nan)
     M[:, 2, 2] = [-0.5, -1.5]
-    issue = only(check(make_dataset(0.1, 0.5, 0.0, mueller_over_m00=M)))
+    issue = only(check(make_dataset(0.1, [0.4, 0.5], 0.0, mueller_over_m00=M)))
     assert (issue.severity, issue.rows) == ("warning", (1,)) and "|m_ij|/m00 = 1.5" in issue.message
 
 

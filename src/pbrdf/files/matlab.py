@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrdf.errors import DataError
+from pbrdf.files.hdf5_guard import Look
 from pbrdf.files.mat5 import mat5_arrays
 from pbrdf.files.text import first_bytes
 
@@ -98,6 +99,7 @@ def _opened(path: Path) -> Iterator[Any]:
     import h5py
 
     try:
+        Look(path, kind="a MATLAB file").require_sound()
         with h5py.File(path) as file:
             yield file
     except (OSError, KeyError, RuntimeError, ValueError, TypeError) as error:

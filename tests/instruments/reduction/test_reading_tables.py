@@ -381,7 +381,9 @@ def test_a_row_of_units(table, monkeypatch):
     """Units that a row under the names says, as files.delimited gives them."""
     units = ["deg", "deg", "deg", "rad", "%", "%"]
     read_table = reading_tables.read_table
-    monkeypatch.setattr(reading_tables, "read_table", lambda path: replace(read_table(path), units=units))
+    monkeypatch.setattr(
+        reading_tables, "read_table", lambda path, sheet: replace(read_table(path, sheet), units=units)
+    )
     rows = [
         f"40,{view},15,{float(np.deg2rad(a))!r},{100 * reading(s, a)!r},{1.0}"
         for s, view in zip(STOKES, VIEWS, strict=True)

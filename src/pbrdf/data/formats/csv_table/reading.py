@@ -24,9 +24,6 @@ from pbrdf.files.delimited import TABLE_EXTENSIONS, Table, read_table
 
 __all__ = ["READER", "read_csv", "read_rows", "selected"]
 
-#: Characters of a column's name; more are a damaged line.
-_LONGEST_NAME = 1000
-
 
 def read_csv(
     path: str | Path,
@@ -129,8 +126,6 @@ def read_rows(
     """
     path = table.path
     table.require_rows()
-    if len(longest := max(table.names, key=len)) > _LONGEST_NAME:
-        raise DataError(f"{path}: line {table.names_line}: {longest[:40]!r}… is no name of a column")
     options = {
         "quantity": quantity,
         "azimuth": azimuth,
