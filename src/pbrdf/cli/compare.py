@@ -143,8 +143,8 @@ def compare(
         print(folder)
     else:
         console = output_console()
-        print_columns(dataset, file)
         print_summary(report, console)
+        print_columns(dataset, file)
         console.print(f"\nWritten to {folder}/: {', '.join(path.name for path in written)}", markup=False)
     if not comparison.best.result.settled:
         raise typer.Exit(NOT_CONVERGED)
