@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import contextlib
 import csv
+import functools
 import math
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
@@ -423,14 +424,18 @@ def _cut_off(table: Table) -> Iterator[str]:
 
 def column_names(path: Path) -> list[str]:
     """Column names of a table, to recognise its format by; none if the file is no table or cannot be read."""
-    raw = first_bytes(path, _HEAD)
-    if not raw or is_workbook(raw):
-        return []
+    return list(_names_in(first_bytes(path, _HEAD)))
+
+
+@functools.lru_cache(maxsize=2)
+def _names_in(head: bytes) -> tuple[str, ...]:
+    """Kept for a while: one reader after the other asks for those of the same file."""
+    if not head or is_workbook(head):
+        return ()
     try:
-        text = utf8(path, raw)
-        return find_layout(path, _head_lines(_plain_blanks(text))).names
+        return tuple(find_layout(Path(), _head_lines(_plain_blanks(utf8(Path(), head)))).names)
     except DataError:
-        return []
+        return ()
 
 
 def write_table(
