@@ -7,6 +7,7 @@ all the others. What else the package reads is named in :func:`kinds`.
 
 from __future__ import annotations
 
+import warnings
 import zipfile
 from collections.abc import Callable
 from contextlib import suppress
@@ -20,7 +21,7 @@ from fuzz_seeds import READER_SEEDS, write_tables, write_workbook, write_workboo
 
 import pbrdf
 from pbrdf.data import readers
-from pbrdf.errors import PbrdfError
+from pbrdf.errors import PbrdfError, PluginWarning
 
 __all__ = ["Kind", "kinds", "write_seeds"]
 
@@ -230,6 +231,11 @@ def kinds(folder: Path) -> list[Kind]:
         rows, columns = series.shape
         return picture_averages(series, {"all": Rectangle(0, columns, 0, rows)})
 
+    def by_content(path: Path) -> Any:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", PluginWarning)
+            return pbrdf.read(path)
+
     def workbook(path: Path) -> Any:
         packed = path.parent / f"packed{path.suffix}"
         with zipfile.ZipFile(packed, "w") as archive:
@@ -252,6 +258,8 @@ def kinds(folder: Path) -> list[Kind]:
         )
         for name, paths in seeds.items()
     ]
+    # as a user reads them, without the name of a format: none of those that look at a file may fail at it
+    found.append(Kind("by content", every, by_content, 3.0))
     table: tuple[tuple[str, tuple[str, ...], Callable[[Path], Any]], ...] = (
         ("analyser table", ("analyser.csv",), read_analyzer),
         ("analyser map", ("analyser.nc",), read_analyzer),

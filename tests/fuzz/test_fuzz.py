@@ -94,8 +94,8 @@ def test_some_hundred_damaged_inputs_are_read_or_refused(folder):
 
 _IN_THIS_PROCESS = (
     "csv", "scatmech", "cornell", "pbsdf", "zemax", "rgl", "spectraray", "readings", "fred", "speos", "openmaterial",
-    "lighttools", "woollam", "alta", "astm", "workbook parts", "raw frames", "analyser table", "instrument", "regions", "calibration table",
-    "angle table", "band", "model",
+    "lighttools", "woollam", "alta", "astm", "workbook parts", "raw frames", "analyser table", "instrument", "regions",
+    "calibration table", "angle table", "band", "model",
 )  # fmt: skip
 
 
