@@ -178,11 +178,10 @@ def _write_measurements(folder: Path) -> None:
 
 
 def _write_pictures(folder: Path) -> None:
-    import mitsuba as mi
-
-    mi.set_variant("scalar_rgb")
     from pbrdf.rendering.picture import StokesPicture, write_exr
+    from pbrdf.rendering.variant import start_mitsuba
 
+    mi = start_mitsuba()
     stokes = np.ones((4, 4, 6)) * np.array([1.0, 0.2, 0.1, 0.0])[:, None, None]
     write_exr(StokesPicture(stokes, 0.01 * stokes, {"title": "a paint"}), folder / "stokes.exr", [0.5])
     names = [f"S{i}.{color}" for i in range(4) for color in "RGB"]
@@ -222,11 +221,10 @@ def kinds(folder: Path) -> list[Kind]:
 
     def rendered(path: Path) -> Any:
         """Pixels that are not finite are dead; what is left must be finite."""
-        import mitsuba as mi
-
         from pbrdf.rendering.picture_regions import open_series, picture_averages
+        from pbrdf.rendering.variant import start_mitsuba
 
-        mi.set_variant("scalar_rgb")
+        start_mitsuba()
         series = open_series([path])
         rows, columns = series.shape
         return picture_averages(series, {"all": Rectangle(0, columns, 0, rows)})
