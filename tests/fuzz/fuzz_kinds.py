@@ -1,27 +1,29 @@
 """What is fuzzed: kinds of input, each with whole files to damage and the function that reads them.
 
-Every reader of data is a kind by itself, one that comes with a package or a later version too: its seed is written by
-its own writer, or by a line in :data:`READER_SEEDS`. A reader with neither is given the seeds of all the others. What
-else the package reads is named in :func:`kinds`.
+Every reader of data is a kind by itself, one that comes with a package or a later version too: its seeds are written
+by its own writer, or by a line in ``READER_SEEDS`` of :mod:`fuzz_seeds`. A reader with neither is given the seeds of
+all the others. What else the package reads is named in :func:`kinds`.
 """
 
 from __future__ import annotations
 
+import warnings
+import zipfile
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from fuzz_seeds import READER_SEEDS, write_tables, write_workbook, write_workbook_parts
 
 import pbrdf
 from pbrdf.data import readers
-from pbrdf.errors import PbrdfError
+from pbrdf.errors import PbrdfError, PluginWarning
 
-__all__ = ["READER_SEEDS", "Kind", "kinds", "write_seeds"]
-
-Maker = Callable[[Path], Any]
+__all__ = ["Kind", "kinds", "write_seeds"]
 
 
 @dataclass(frozen=True)
@@ -59,50 +61,22 @@ def _mueller() -> Any:
     )
 
 
-def _scatmech(path: Path) -> None:
-    names = [f"m{i}{j}" for i in range(1, 5) for j in range(1, 5) if (i, j) != (1, 1)]
-    lines = ["lambda,thetai,phi,thetar,phir,f_r11," + ",".join(names)]
-    lines += [f"0.55,-30,0,{t},0,0.1,{','.join(['0.01'] * 15)}" for t in (10, 20, 30)]
-    path.write_text("\n".join(lines), encoding="utf-8")
-
-
-def _cornell(path: Path) -> None:
-    lines = ["# a paint", "2", "400 500"] + [f"0.5 3.1 {t} 0.0 0.1 0.2" for t in (0.1, 0.2, 0.3)]
-    path.write_text("\n".join(lines), encoding="utf-8")
-
-
-def _pbsdf(path: Path) -> None:
-    from pbrdf.data.formats.tensor_file import write_tensors
-
-    axes = {name: np.linspace(0.0, 1.5, 3, dtype=np.float32)[None] for name in ("theta_h", "theta_d")}
-    axes["phi_d"] = np.linspace(-3.1, 3.1, 5, dtype=np.float32)[None]
-    M = np.broadcast_to(np.eye(4, dtype=np.float32), (5, 3, 3, 2, 4, 4)).copy()
-    write_tensors({**axes, "wvls": np.array([450, 550], dtype=np.uint16), "M": M}, path)
-
-
-def _merl(path: Path) -> None:
-    from pbrdf.data.formats.merl import SHAPE, write_planes
-
-    write_planes(np.full((3, *SHAPE), 0.1), path)
-
-
-#: By the name of a reader that writes nothing: the seed's extension, and a function that writes it.
-READER_SEEDS: dict[str, tuple[str, Maker]] = {
-    "scatmech": (".csv", _scatmech),
-    "cornell": (".brdf", _cornell),
-    "pbsdf": (".pbsdf", _pbsdf),
-    "merl": (".binary", _merl),
-}
 #: Their files are large, and little of them is structure.
 _SHARES = {"merl": 0.02}
-_INSTRUMENTS = ("paper", "sony_imx250mzr")
+_INSTRUMENTS = ("paper", "sony_imx250mzr", "sony_imx250myr")
+#: Dual rotating retarders, their settings stated in every way.
+_DUAL = {
+    "dual": ("steps = 16", "generator_retardance = 88", "diattenuation = 0.99"),
+    "dual_pairs": (f"angles = {[[6 * k, 30 * k] for k in range(16)]}", "generator_reference_angle = 2"),
+    "dual_lists": (f"generator_angles = {[6.5 * k for k in range(16)]}", "retardance = 91", "polarizer = 45"),
+}
 
 
 def _reader_seeds(name: str, folder: Path) -> tuple[Path, ...]:
     """Where the seeds of a reader are."""
     reader = readers._of_name(folder, name)
     if name in READER_SEEDS:
-        return (folder / f"{name}{READER_SEEDS[name][0]}",)
+        return tuple(folder / f"{name}{rest}" for rest in READER_SEEDS[name])
     if reader.write is not None and reader.written:
         return (folder / f"{name}{reader.written[0]}", folder / f"{name}_mueller{reader.written[0]}")
     return ()
@@ -125,8 +99,8 @@ def write_seeds(folder: Path, *, fit: bool = True) -> None:
 
     for name in readers.format_names():
         places = _reader_seeds(name, folder)
-        if name in READER_SEEDS:
-            READER_SEEDS[name][1](places[0])
+        for place, write in zip(places, READER_SEEDS.get(name, {}).values(), strict=False):
+            write(place)
         for place, dataset in zip(places, (_dataset(std={"I": 0.01}), _mueller()), strict=False):
             with suppress(PbrdfError):  # not every format holds both
                 if name not in READER_SEEDS:
@@ -143,6 +117,8 @@ def write_seeds(folder: Path, *, fit: bool = True) -> None:
         "[polarimeter.band]\nshape = 'gaussian'\ncenter = 550\nwidth = 20\nbirefringence = [0.9, 0.01]",
         "[detector]\nbits = 12\ngain = 0.5\nread_noise = 3.0\noffset = 10\n[frames]\npattern = 'x.png'",
     )
+    for name, lines in _DUAL.items():
+        _text(folder / f"{name}.toml", "[polarimeter]", "kind = 'dual_rotating_retarder'", *lines)
     _text(
         folder / "regions.toml",
         "[paint]\nrectangle = [1, 20, 3, 40]\n[disc]\nellipse = [32, 24, 4.5, 3]",
@@ -167,13 +143,61 @@ def write_seeds(folder: Path, *, fit: bool = True) -> None:
     frames = xr.Dataset({"frames": (("state", "y", "x"), np.stack([picture] * 2))}, {"state": ["a", "b"]})
     frames.to_netcdf(folder / "frames.nc", engine="h5netcdf")
     frames.to_zarr(folder / "frames.zarr", zarr_format=2, consolidated=True, write_empty_chunks=True)
+    _write_measurements(folder)
+    for suffix in (".xlsx", ".ods"):
+        write_workbook(folder / f"book{suffix}")
+        write_workbook_parts(folder / f"parts{suffix}")
+    write_tables(folder)
+    if find_spec("mitsuba") is not None:
+        _write_pictures(folder)
     if fit:
         write_result(pbrdf.fit(_dataset(12, std={"I": 0.01}), starts=2), folder / "fit.nc")
+
+
+def _write_measurements(folder: Path) -> None:
+    """Folders of frames with the instrument that took them: a camera's bare pixels, and a mosaic under colours."""
+    from PIL import Image
+
+    from pbrdf.instruments.polarimeter.instrument_files import save_instrument
+    from pbrdf.instruments.polarimeter.presets import preset
+
+    raw, color = folder / "raw_frames", folder / "color_frames"
+    for place in (raw, color):
+        place.mkdir()
+    _text(
+        raw / "camera.toml",
+        "[polarimeter]\nkind = 'rotating_polarizer'\nangles = [0, 60, 120]\n[detector]\nbits = 12",
+        "[frames]\nraw = { width = 8, height = 6, format = 'Mono12p', header = 4 }",
+        "pages = 'repeat, state'\nrepeats = 2\npattern = '{series}.raw'\ndark_frame = 'dark.raw'",
+    )
+    for name, pictures in (("a.raw", 6), ("b.raw", 6), ("dark.raw", 1)):
+        (raw / name).write_bytes(bytes(4) + bytes(range(72)) * pictures)
+    save_instrument(preset("sony_imx250myr"), color / "camera.toml")
+    Image.fromarray(np.arange(128, dtype=np.uint8).reshape(8, 16)).save(color / "a.png")
+    np.save(color / "b.npy", np.arange(128, dtype=np.uint8).reshape(8, 16))
+
+
+def _write_pictures(folder: Path) -> None:
+    from pbrdf.rendering.picture import StokesPicture, write_exr
+    from pbrdf.rendering.variant import start_mitsuba
+
+    mi = start_mitsuba()
+    stokes = np.ones((4, 4, 6)) * np.array([1.0, 0.2, 0.1, 0.0])[:, None, None]
+    write_exr(StokesPicture(stokes, 0.01 * stokes, {"title": "a paint"}), folder / "stokes.exr", [0.5])
+    names = [f"S{i}.{color}" for i in range(4) for color in "RGB"]
+    values = np.repeat(np.moveaxis(stokes, 0, -1), 3, axis=-1) * np.tile([1.0, 0.5, 0.2], 4)
+    bitmap = mi.Bitmap(
+        np.ascontiguousarray(values, dtype=np.float32),
+        pixel_format=mi.Bitmap.PixelFormat.MultiChannel,
+        channel_names=names,
+    )
+    bitmap.write(str(folder / "colors.exr"), mi.Bitmap.FileFormat.OpenEXR)
 
 
 def kinds(folder: Path) -> list[Kind]:
     """All kinds whose seeds :func:`write_seeds` has written into a folder."""
     from pbrdf.instruments.calibration.input_table import read_input_table
+    from pbrdf.instruments.frames.frame_files import open_frames
     from pbrdf.instruments.frames.frame_grids import open_grid
     from pbrdf.instruments.frames.pictures import open_pictures
     from pbrdf.instruments.goniometer.angle_table import read_angles
@@ -181,6 +205,7 @@ def kinds(folder: Path) -> list[Kind]:
     from pbrdf.instruments.polarimeter.band import read_band
     from pbrdf.instruments.polarimeter.instrument_files import load_instrument
     from pbrdf.instruments.reduction.region_files import read_regions
+    from pbrdf.instruments.reduction.regions import Rectangle
 
     def picture(path: Path) -> Any:
         opened = open_pictures(path)
@@ -189,6 +214,32 @@ def kinds(folder: Path) -> list[Kind]:
     def frames(path: Path) -> Any:
         opened = open_grid(path, ("a", "b"))
         return opened.read(0, 0, min(opened.rows, 1000))
+
+    def measurement(path: Path) -> Any:
+        opened = open_frames(path, load_instrument(path / "camera.toml"))
+        return [opened.read(k, 0, min(opened.rows, 1000)) for k in range(min(len(opened.names), 10))]
+
+    def rendered(path: Path) -> Any:
+        """Pixels that are not finite are dead; what is left must be finite."""
+        from pbrdf.rendering.picture_regions import open_series, picture_averages
+        from pbrdf.rendering.variant import start_mitsuba
+
+        start_mitsuba()
+        series = open_series([path])
+        rows, columns = series.shape
+        return picture_averages(series, {"all": Rectangle(0, columns, 0, rows)})
+
+    def by_content(path: Path) -> Any:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", PluginWarning)
+            return pbrdf.read(path)
+
+    def workbook(path: Path) -> Any:
+        packed = path.parent / f"packed{path.suffix}"
+        with zipfile.ZipFile(packed, "w") as archive:
+            for part in sorted(path.rglob("*")):
+                archive.write(part, part.relative_to(path))
+        return pbrdf.read(packed)
 
     seeds = {
         name: tuple(path for path in _reader_seeds(name, folder) if path.exists())
@@ -205,10 +256,12 @@ def kinds(folder: Path) -> list[Kind]:
         )
         for name, paths in seeds.items()
     ]
+    # as a user reads them, without the name of a format: none of those that look at a file may fail at it
+    found.append(Kind("by content", every, by_content, 3.0))
     table: tuple[tuple[str, tuple[str, ...], Callable[[Path], Any]], ...] = (
         ("analyser table", ("analyser.csv",), read_analyzer),
         ("analyser map", ("analyser.nc",), read_analyzer),
-        ("instrument", (*(f"{name}.toml" for name in _INSTRUMENTS), "band.toml"), load_instrument),
+        ("instrument", (*(f"{name}.toml" for name in (*_INSTRUMENTS, *_DUAL)), "band.toml"), load_instrument),
         ("regions", ("regions.toml", "regions.csv"), read_regions),
         ("calibration table", ("light.csv", "stokes.csv"), read_input_table),
         ("angle table", ("angles.csv",), read_angles),
@@ -217,6 +270,12 @@ def kinds(folder: Path) -> list[Kind]:
         ("fit", ("fit.nc",), pbrdf.load_fit),
         ("picture", ("picture.png", "picture.tif", "picture.npy"), picture),
         ("frames", ("frames.nc", "frames.zarr"), frames),
+        ("raw frames", ("raw_frames",), measurement),
+        ("colour mosaic", ("color_frames",), measurement),
+        ("rendered picture", ("stokes.exr", "colors.exr"), rendered),
+        ("workbook", ("book.xlsx", "book.ods"), pbrdf.read),
+        ("workbook parts", ("parts.xlsx", "parts.ods"), workbook),
+        ("MATLAB table", ("table.mat", "table_73.mat", "grid.mat"), pbrdf.read),
     )
     for name, files, read in table:
         paths = tuple(folder / file for file in files)

@@ -84,3 +84,23 @@ def test_a_file_without_the_layers_is_refused(mitsuba, tmp_path):
         read_exr(file)
     with pytest.raises(DataError, match="cannot be read"):
         read_exr(tmp_path / "nothing.exr")
+
+
+def test_a_header_that_is_no_text_is_refused(picture, tmp_path):
+    """Names of layers and texts of a header are UTF-8; what damage has made of them is told."""
+    write_exr(picture, tmp_path / "p.exr")
+    whole = (tmp_path / "p.exr").read_bytes()
+    for word in (b"a test", b"title", b"S1.Y"):
+        damaged = whole.replace(word, b"\xff" + word[1:], 1)
+        assert damaged != whole
+        (tmp_path / "d.exr").write_bytes(damaged)
+        with pytest.raises(DataError, match=r"d\.exr: a name or a text in its header is damaged"):
+            read_exr(tmp_path / "d.exr")
+
+
+def test_standard_errors_of_some_layers_alone_are_not_taken(picture, tmp_path):
+    write_exr(picture, tmp_path / "p.exr")
+    (tmp_path / "d.exr").write_bytes((tmp_path / "p.exr").read_bytes().replace(b"S1.std", b"S1.sxd", 1))
+    found = read_exr(tmp_path / "d.exr")
+    np.testing.assert_allclose(found.stokes, picture.stokes, atol=1e-6)
+    assert np.isnan(found.std).all()

@@ -102,6 +102,8 @@ def _opened(path: Path) -> Iterator[Any]:
         Look(path, kind="a MATLAB file").require_sound()
         with h5py.File(path) as file:
             yield file
+    except DataError:
+        raise
     except (OSError, KeyError, RuntimeError, ValueError, TypeError) as error:
         raise DataError(f"{path}: cannot be read as a MATLAB file: {' '.join(str(error).split())}") from error
     except MemoryError as error:

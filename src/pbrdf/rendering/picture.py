@@ -163,26 +163,30 @@ def read_exr_colors(path: Path) -> dict[str, StokesPicture]:
 
     try:
         bitmap = mi.Bitmap(str(path))
-    except RuntimeError as error:
+        names = [channel.name for channel in bitmap.struct_()]
+        metadata: Any = bitmap.metadata()
+        header = {name: metadata[name] for name in metadata}
+        values = np.array(bitmap, dtype=float)
+    except UnicodeDecodeError as error:
+        raise DataError(f"{path}: a name or a text in its header is damaged: {error}") from error
+    except (RuntimeError, ValueError, MemoryError) as error:
         raise DataError(f"{path}: cannot be read as a picture: {' '.join(str(error).split())}") from error
-    names = [channel.name for channel in bitmap.struct_()]
-    values = np.array(bitmap, dtype=float)
     if {f"S{i}.{color}" for i in range(4) for color in _COLORS} <= set(names):
-        return _mitsuba_colors(names, values, bitmap.metadata())
+        return _mitsuba_colors(names, values, header)
     missing = [f"S{i}.Y" for i in range(4) if f"S{i}.Y" not in names]
     if missing:
         raise DataError(f"{path}: there is no layer {missing[0]}; the file has {', '.join(names)}")
     stokes = np.stack([values[..., names.index(f"S{i}.Y")] for i in range(4)])
     std = np.full_like(stokes, np.nan)
-    if "S0.std" in names:
+    if all(f"S{i}.std" in names for i in range(4)):
         std = np.stack([values[..., names.index(f"S{i}.std")] for i in range(4)])
-    header: Any = bitmap.metadata()
-    return {"": StokesPicture(stokes, std, {name: header[name] for name in header})}
+    return {"": StokesPicture(stokes, std, header)}
 
 
-def _mitsuba_colors(names: Sequence[str], values: np.ndarray, header: Any) -> dict[str, StokesPicture]:
+def _mitsuba_colors(
+    names: Sequence[str], values: np.ndarray, attrs: dict[str, Any]
+) -> dict[str, StokesPicture]:
     """Pictures of Mitsuba's layers in this project's convention."""
-    attrs = {name: header[name] for name in header}
     found = {}
     for color in _COLORS:
         stokes = np.stack([values[..., names.index(f"S{i}.{color}")] for i in range(4)])

@@ -108,6 +108,13 @@ def test_a_brdf_file_has_a_percentage_for_each_table(text_file):
         assert_allclose(ds["I"].values[keep], percent / 100 / np.pi, rtol=2e-4)
 
 
+@pytest.mark.parametrize("counts", ["1 x", "1 nan", "x 1", "1 0", "1 1.5", "1"])
+def test_counts_of_a_brdf_file_are_whole_numbers(text_file, counts):
+    text = f"OPTIS - brdf surface file v9.0\n0\nA paint\n0\n\n1\t0\n1\n{counts}\n10\n500\n10\n{table(3.0)}"
+    with pytest.raises(DataError, match=r"paint\.brdf: line 8: .*count"):
+        read(text_file(text, "paint.brdf"))
+
+
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [

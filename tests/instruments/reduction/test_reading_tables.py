@@ -7,6 +7,7 @@ positive for light that turns from p towards s, anticlockwise for the receiver w
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -780,3 +781,22 @@ def test_fits_of_readings_and_of_stokes_parameters_are_the_same(table):
         results.append(pbrdf.fit(pbrdf.read(table(text + "\n", name)), starts=8))
     one, other = (np.array([e.value for e in found.estimates.values()]) for found in results)
     assert_allclose(one, other, rtol=1e-4)
+
+
+@pytest.mark.parametrize("mark", ["[", "(", "_", " ", "1", "x", "[" + "1"])
+@pytest.mark.parametrize(
+    "text",
+    [
+        wide(linear(["I0", "I45", "I90", "I135"])),
+        "theta_i,theta_r,phi,polarizer,reading\n40,10,15,0,1\n40,10,15,45,2\n40,10,15,90,3\n",
+    ],
+)
+def test_very_long_names_of_columns_cost_no_time(table, text, mark):
+    """A search from each of their characters to their end would take minutes; none of the others is misread."""
+    names, *rows = text.splitlines()
+    name = "a" + mark * (100_000 // len(mark)) + "b"
+    longer = "\n".join([f"{names},{name}", *(f"{row},0.5" for row in rows)]) + "\n"
+    begun = time.monotonic()
+    ds = pbrdf.read(table(longer), format="readings")
+    assert time.monotonic() - begun < 5.0
+    assert_allclose(stokes_of(ds), stokes_of(pbrdf.read(table(text), format="readings")))

@@ -239,8 +239,12 @@ def _iridescent(lines: NumberLines) -> list[tuple[_Table, _Spectrum]]:
     counts = lines.text("how many angles of incidence and wavelengths").split()
     if len(counts) != 2:
         raise lines.error("how many angles of incidence and wavelengths is expected, two counts")
-    incidences = _incidences(lines, lines.count_in(counts[0], "angles of incidence"))
-    wavelengths = lines.numbers(int(float(counts[1])), "wavelengths")
+    angles, colors = (
+        lines.count_in(text, what)
+        for text, what in zip(counts, ("angles of incidence", "wavelengths"), strict=True)
+    )
+    incidences = _incidences(lines, angles)
+    wavelengths = lines.numbers(colors, "wavelengths")
     tables: list[tuple[_Table, _Spectrum]] = []
     for angle in incidences:
         for nanometres in wavelengths:

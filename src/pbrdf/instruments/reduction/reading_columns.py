@@ -401,7 +401,9 @@ def _without_time(key: str) -> str:
 
 
 def _key(name: str) -> str:
-    """The words of a name without units, in one; a V in volts is no Stokes V but a voltage."""
+    """The words of a name without units, in one; a V in volts is no Stokes V but a voltage. None of a very long one."""
+    if len(name) > LONGEST:
+        return ""
     if re.fullmatch(r"v[\s_]*[\[(]?[mµuμ]?v[\])]?", name.strip().lower()):
         return "voltage"
     text = re.sub(r"[\[(].*?[\])]", " ", name.lower())
@@ -422,6 +424,8 @@ def _key(name: str) -> str:
 
 
 def _unit(name: str) -> str:
+    if len(name) > LONGEST:
+        return ""
     bracketed = re.search(r"[\[(]\s*([^\])]*?)\s*[\])]", name)
     if bracketed:
         return bracketed[1].lower()
@@ -439,6 +443,8 @@ def _stated(names: Sequence[str], settings: Settings, where: str) -> dict[int, R
     lowered = {name.lower(): state for name, state in settings.states.items()}
     missing = set(lowered)
     for index, name in enumerate(names):
+        if len(name) > LONGEST:
+            continue
         text, deviation, coverage = split_uncertainty(name)
         plain = re.sub(r"\s*[\[(].*?[\])]\s*$", "", text).strip().lower()
         for candidate in (name.lower(), plain, re.sub(r"^i_?", "", plain)):
