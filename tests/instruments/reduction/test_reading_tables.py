@@ -780,3 +780,10 @@ def test_fits_of_readings_and_of_stokes_parameters_are_the_same(table):
         results.append(pbrdf.fit(pbrdf.read(table(text + "\n", name)), starts=8))
     one, other = (np.array([e.value for e in found.estimates.values()]) for found in results)
     assert_allclose(one, other, rtol=1e-4)
+
+
+def test_columns_of_angles_11_and_45_are_readings_and_those_of_a_matrix_not():
+    assert holds_readings(["theta_i", "theta_r", "phi", "I_0", "I_45", "I_90"])
+    assert holds_readings(["theta_i", "theta_r", "phi", "I_11", "I_56", "I_101"])
+    assert not holds_readings(["theta_i", "theta_r", "phi", "S_11", "S_12", "S_21", "S_22"])
+    assert not holds_readings(["theta_i", "theta_r", "phi", "S00", "S01", "S10", "S11"])
