@@ -225,3 +225,12 @@ def test_a_degree_of_polarisation_that_may_be_any_is_named(text_file, name):
     assert_allclose(
         read(path, column={"dolp": name})["dolp"], np.array([0.1, 0.2]) / (100 if "%" in name else 1)
     )
+
+
+def test_rows_that_cannot_be_are_left_out_where_asked(text_file):
+    path = text_file(f"{STATED}theta_i,theta_r,phi,I\n90,20,0,0.3\n30,20,0,0.3\n")
+    with pytest.raises(DataError, match=r"line 5: .*\(90°\).*leave such rows out with skip_invalid=True"):
+        read(path)
+    assert read(path, skip_invalid=True).sizes["geometry"] == 1
+    with pytest.raises(DataError, match=r"is not in \[0°, 90°\)$"):
+        read(text_file(f"{STATED}theta_i,theta_r,phi,I\n90,20,0,0.3\n"))

@@ -248,3 +248,18 @@ def test_small_letters_beside_a_capital_intensity_may_be_shares(text_file):
     assert_allclose(ds["Q_over_I"], [0.1])
     assert check(ds) == []
     assert check(read(text_file(f"{STATED}theta_i,theta_r,phi,i,q,u\n30,20,0,0.3,0.1,0.2\n"))) == []
+
+
+def test_names_in_tex(text_file):
+    ds = read(text_file(
+        f"{STATED}$\\theta_i$ (deg),$\\theta_r$ (deg),$\\phi$ (deg),$f_r$ (sr$^{{-1}}$),$\\sigma_{{f_r}}$\n"
+        "30,20,0,0.3,0.01\n"
+    ))  # fmt: skip
+    assert_allclose(ds["I"], [0.3])
+    assert_allclose(ds["I_std"], [0.01])
+
+
+@pytest.mark.parametrize("name", ["$U$", "U:", "U 1/sr", "U [1/sr]"])
+def test_u_in_any_dress_is_asked_about(text_file, name):
+    with pytest.raises(DataError, match="may be the Stokes parameter U or an expanded uncertainty"):
+        read(text_file(f"{STATED}theta_i,theta_r,phi,BRDF,{name}\n30,20,0,0.3,0.01\n"))

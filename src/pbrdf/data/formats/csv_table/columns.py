@@ -427,7 +427,7 @@ class _Resolution:
             column = self.columns.get(variable)
             text = _bare(column.name) if column is not None else ""
             if text in ("q", "u", "v", "s1", "s2", "s3") and variable not in self.mapping:
-                self.assumptions.append(
+                self.remarks.append(
                     f"the column {column.name.text!r} was taken for {variable}, in the unit of I; if it is divided by "
                     f"the intensity, state column={{'{variable}_over_I': {column.name.text!r}}}"
                 )
@@ -435,7 +435,10 @@ class _Resolution:
 
 def _bare(name: Name) -> str:
     """A name without what stands in brackets or after a separator."""
-    return re.split(r"[\[({/,]", name.text)[0].strip()
+    text = re.split(r"[\[({/,]", name.text)[0].strip()
+    if len(name.key) == 1 and not name.uncertainty:  # "$U$", "U 1/sr"
+        return next((letter for letter in text if letter.lower() == name.key), text)
+    return text
 
 
 def _may_be_expanded(name: Name) -> bool:

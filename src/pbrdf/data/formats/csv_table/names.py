@@ -188,7 +188,7 @@ class _Parts:
     """A name while it is taken apart."""
 
     def __init__(self, name: str) -> None:
-        self.rest = plain_text(name)
+        self.rest = _without_tex(plain_text(name))
         self.unit: str | None = None
         self.coverage: float | None = None
         self.expanded = self.standard = self.relative = False
@@ -276,7 +276,7 @@ def parse_name(name: str) -> Name:
     """Take a column's name apart; see :class:`Name`. One longer than any name is said to be none that is understood."""
     if len(name) > LONGEST:
         return Name(name)
-    text = plain_text(name)
+    text = _without_tex(plain_text(name))
     if (ratio := ratio_variable(text)) is not None:
         return Name(name, ratio, key=ratio)
     element = _ELEMENT.fullmatch(text.lower())
@@ -314,6 +314,11 @@ def parse_name(name: str) -> Name:
         name, variable, unit, quantity, key, kind, parts.coverage, relative, elevation,
         (int(indices[1]), int(indices[2])) if indices else None,
     )  # fmt: skip
+
+
+def _without_tex(text: str) -> str:
+    """``$\\sigma_{f_r}$`` as sigma_f_r."""
+    return re.sub(r"_\{([^{}]*)\}", r"_\1", re.sub(r"[$\\]", "", text))
 
 
 def _element(name: str, i: int, j: int) -> Name:
