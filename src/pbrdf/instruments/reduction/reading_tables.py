@@ -612,7 +612,7 @@ def _behind(state: State, settings: Settings) -> str:
     words = _in_words(state, settings)
     if state.named == OPEN:
         return "without analyser"
-    return f"behind {'an' if words.startswith('a') else 'a'} {words}"
+    return f"behind an {words}" if state.vector is not None else f"behind a {words}"
 
 
 def _in_words(state: State, settings: Settings) -> str:

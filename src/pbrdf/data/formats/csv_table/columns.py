@@ -425,8 +425,9 @@ class _Resolution:
             return
         for variable in "QUV":
             column = self.columns.get(variable)
-            text = _bare(column.name) if column is not None else ""
-            if text in ("q", "u", "v", "s1", "s2", "s3") and variable not in self.mapping:
+            if column is None:
+                continue
+            if _bare(column.name) in ("q", "u", "v", "s1", "s2", "s3") and variable not in self.mapping:
                 self.remarks.append(
                     f"the column {column.name.text!r} was taken for {variable}, in the unit of I; if it is divided by "
                     f"the intensity, state column={{'{variable}_over_I': {column.name.text!r}}}"

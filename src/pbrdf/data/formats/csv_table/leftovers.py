@@ -26,7 +26,7 @@ _SAMPLE_WORDS = frozenset(
     ("name", "id", "label", "part", "piece", "object", "run", "scan", "side", "position", "day")
 )
 _WAVELENGTH = re.compile(
-    r"wavelen|wavenum|lambda|(?<![a-z])(?:wl|wvl)(?![a-z])|filter|spectral|colou?r(?![a-z])"
+    r"wavelen|wavenum|photon|frequency|lambda|(?<![a-z])(?:wl|wvl)(?![a-z])|filter|spectral|colou?r(?![a-z])"
 )
 _BAND = frozenset(("band", "bands", "channel", "filter", "color", "colour", "laser", "led", "rgb"))
 _POLARIZATION = re.compile(r"polari[sz]ation|(?<![a-z])pol(?![a-z])|polstate|illumination")

@@ -423,7 +423,7 @@ def _with_multiples(words: list[str]) -> list[str]:
     """The words with ``2 sigma`` as one."""
     joined: list[str] = []
     for word in words:
-        if joined and word.lower() in ("sigma", "sd", "std") and re.fullmatch(r"[1-9]", joined[-1]):
+        if joined and re.fullmatch("sigma|sd|std", word.lower()) and re.fullmatch(r"[1-9]", joined[-1]):
             joined[-1] += word
         else:
             joined.append(word)
