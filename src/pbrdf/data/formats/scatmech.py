@@ -111,7 +111,8 @@ def _require_known_source(path: Path, theta_i: np.ndarray, phi_i: np.ndarray, li
 
 
 def _has_the_columns(path: Path) -> bool:
-    return not {name.lower() for name in column_names(path)}.isdisjoint(_COLUMNS["f_r11"])
+    names = {name.lower() for name in column_names(path)}
+    return not names.isdisjoint(_COLUMNS["f_r11"]) and not names.isdisjoint(("lambda", "thetai"))
 
 
 READER = Reader(

@@ -9,7 +9,7 @@ it (``retarder``, ``qwp``), its ``retardance``, or the name of the ``state``. Wh
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from pbrdf.errors import DataError
@@ -225,7 +225,7 @@ def wide_columns(
     distinct = {name.state for name in values.values() if name.state.named not in (OPEN, DARK)}
     if len(distinct) < 2 and not settings.states:
         return None
-    if not settings.states and _counts(distinct):
+    if not settings.states and (_counts(distinct) or _are_elements(names[index] for index in values)):
         return None
     if sure and _may_be_views(values, names):
         return None
@@ -504,6 +504,15 @@ def _counts(states: set[State]) -> bool:
     if len(angles) < len(states):
         return False
     return max(map(abs, angles)) < 10.0 or max(map(abs, angles)) > 360.0 or min(map(abs, angles)) > 90.0
+
+
+def _are_elements(names: Iterable[str]) -> bool:
+    """Whether the columns are elements of a matrix, S_11, S_12 … S_33 or S00, S01 …, and not angles of 11°, 12° …"""
+    found = [re.search(r"[A-Za-z][\s_(\[{]*(\d)[\s_,]*(\d)(?!\d)", name) for name in names]
+    places = {match.groups() for match in found if match}
+    first = "0" if ("0", "0") in places else "1"
+    within = all(first <= digit <= str(int(first) + 3) for place in places for digit in place)
+    return within and len(places) == len(found) and {(first, first), (first, str(int(first) + 1))} <= places
 
 
 def _without_odd_pairs(found: dict[int, ReadingName]) -> dict[int, ReadingName]:

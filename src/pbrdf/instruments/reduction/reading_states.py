@@ -162,7 +162,9 @@ _QUANTITIES = {
 
 _DEVIATION = "standarduncertainty|uncertainty|unc|stdev|stddev|stderr|std|sd|sem|se|sigma|σ|error|err"
 _WRAPPED = re.compile(rf"({_DEVIATION}|u|δ|delta)\s*[(\[](.+)[)\]]", re.IGNORECASE)
-_BEFORE = re.compile(rf"({_DEVIATION}|u|δ|delta)[\s_.]+(.+)|(d|δ)([IL][\s_.(\[]*[-+]?\d.*)", re.IGNORECASE)
+_BEFORE = re.compile(
+    rf"({_DEVIATION}|u|δ|delta)(?:[\s_.]+|(?=\d))(.+)|(d|δ)([IL][\s_.(\[]*[-+]?\d.*)", re.IGNORECASE
+)
 _AFTER = re.compile(rf"(.*?)[\s_.]+({_DEVIATION}|u)|(.*?)({_DEVIATION})", re.IGNORECASE)
 _COVERAGE = re.compile(r"[(\[,;]?\s*\bk\s*=\s*(\d+(?:\.\d+)?)\s*[)\]]?", re.IGNORECASE)
 _BRACKETS = re.compile(r"[(\[{]([^()\[\]{}]*)[)\]}]")

@@ -262,7 +262,7 @@ def _remember(
     assert origin is not None
     if isinstance(layout, WideColumns):
         meanings = {
-            table.names[column.index]: f"reading behind a {_in_words(state, settings)}"
+            table.names[column.index]: f"reading {_behind(state, settings)}"
             for column, state in zip(layout.readings, states, strict=True)
         }
         beside = {column.deviation for column in layout.readings} - {None}
@@ -608,11 +608,18 @@ def _short(state: State) -> str:
     return text if state.retarder is None else f"{text} retarder {state.retarder:g}°".strip()
 
 
+def _behind(state: State, settings: Settings) -> str:
+    words = _in_words(state, settings)
+    if state.named == OPEN:
+        return "without analyser"
+    return f"behind an {words}" if state.vector is not None else f"behind a {words}"
+
+
 def _in_words(state: State, settings: Settings) -> str:
     if state.named in ("p", "s"):
         return f"polariser along {state.named}"
     if state.named in ("right", "left"):
-        return f"passes {state.named} circular light"
+        return f"{state.named} circular analyser"
     if state.named == OPEN:
         return "no analyser"
     if state.vector is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 import shlex
 from pathlib import Path
@@ -89,14 +90,16 @@ def on_the_command_line(sentence: str) -> str:
     """Turn the advice to use arguments of Python into advice to use the options of the command line."""
 
     def option(match: re.Match[str]) -> str:
-        name = match["name"]
-        pairs = re.findall(r"'([^']*)': ('[^']*'|\"[^\"]*\"|…)", match["pairs"])
-        return " ".join(
-            f"--{name} {_quoted(f'{key}={value.strip(chr(39) + chr(34))}')}" for key, value in pairs
-        )
+        pairs = re.findall(rf"({_TEXT}): ({_TEXT}|…)", match["pairs"])
+        return " ".join(_option(match["name"], f"{_plain(key)}={_plain(value)}") for key, value in pairs)
 
-    sentence = re.sub(r"\b(?P<name>column|where|unit)=\{(?P<pairs>[^{}]*)\}", option, sentence)
-    sentence = re.sub(r"\bignore=\[(['\"])(.*?)\1\]", lambda match: f"--ignore {_quoted(match[2])}", sentence)
+    sentence = re.sub(
+        rf"\b(?P<name>column|where|unit)=\{{(?P<pairs>{_TEXT}: (?:{_TEXT}|…)(?:, {_TEXT}: (?:{_TEXT}|…))*)\}}",
+        option,
+        sentence,
+    )
+    sentence = re.sub(rf"\bignore=\[({_TEXT})\]", lambda match: _option("ignore", _plain(match[1])), sentence)
+    sentence = sentence.replace("skip_invalid=True", "--skip-invalid")
     return re.sub(
         r"\b(azimuth|illumination|coverage)=(?:'([^']*)'|([\d.]+))",
         lambda match: f"--{match[1]} {match[2] or match[3]}",
@@ -104,9 +107,21 @@ def on_the_command_line(sentence: str) -> str:
     )
 
 
+#: A text as Python writes it.
+_TEXT = r"(?:'(?:[^'\\]|\\.)*'|\"(?:[^\"\\]|\\.)*\")"
+
+
+def _plain(text: str) -> str:
+    return text if text == "…" else str(ast.literal_eval(text))
+
+
+def _option(name: str, value: str) -> str:
+    return f"--{name}{'=' if value.startswith('-') else ' '}{_quoted(value)}"
+
+
 def _quoted(text: str) -> str:
     """A word of a command line, in quotation marks where a shell needs them."""
-    return shlex.quote(text) if re.search(r"[\s()\[\]&;|<>$*?'\"]", text) else text
+    return shlex.quote(text) if re.search(r"[^\w@%+=:,./…°-]", text) else text
 
 
 def cautions(ds: xr.Dataset) -> list[str]:

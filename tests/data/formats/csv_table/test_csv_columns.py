@@ -94,3 +94,19 @@ def test_columns_that_are_not_understood(text_file, names, options, words):
     row = ",".join("1" * len(names.split(",")))
     with pytest.raises(DataError, match=words):
         read(text_file(f"# quantity: brdf\n{names}\n{row}\n"), **options)
+
+
+@pytest.mark.parametrize(
+    "name", ["S_{}{}", "S{}{}", "F{}{}", "f_r{}{}", "Z_{}{}", "M[{},{}]", "mueller_{}_{}"]
+)
+@pytest.mark.parametrize("first", [0, 1])
+def test_elements_of_a_matrix_are_no_angles_of_a_polariser(text_file, name, first):
+    places = [(i, j) for i in range(3) for j in range(3)]
+    names = ['"' + name.format(i + first, j + first) + '"' for i, j in places]
+    values = [0.3, 0.01, 0.0, 0.01, 0.3, 0.02, 0.03, 0.0, 0.2]
+    ds = read(text_file(
+        "# quantity: brdf\n# azimuth: forward=0\n# stokes: p-s\n"
+        f"theta_i,theta_r,phi,{','.join(names)}\n30,20,0,{','.join(map(str, values))}\n"
+    ))  # fmt: skip
+    assert_allclose(ds["mueller"][0, :3, :3], np.reshape(values, (3, 3)))
+    assert "readings" not in ds.attrs

@@ -209,3 +209,28 @@ def test_a_table_without_values_is_told_how_to_name_them(text_file):
         DataError, match=r"no column holds values; name one, .*column=\{'I': …\}.* theta_i, theta_r, L_o"
     ):
         read(text_file(f"{STATED}theta_i,theta_r,L_o\n30,20,1\n"))
+
+
+@pytest.mark.parametrize("name", ["u_r", "Uc", "ci_low", "upper", "SNR", "precision"])
+def test_other_statements_of_uncertainty_are_named(text_file, name):
+    (left,) = check(read(text_file(f"{STATED}theta_i,theta_r,phi,I,{name}\n30,20,0,0.3,0.01\n")))
+    assert f"the column {name!r} looks like a statement of uncertainty and is not used" in str(left)
+
+
+@pytest.mark.parametrize("name", ["DoP", "DoP (%)", "P (%)", "degree of polarisation"])
+def test_a_degree_of_polarisation_that_may_be_any_is_named(text_file, name):
+    path = text_file(f"{STATED}theta_i,theta_r,phi,I,{name}\n30,20,0,0.3,0.1\n30,30,0,0.3,0.2\n")
+    (left,) = check(read(path))
+    assert f"use it with column={{'dolp': {name!r}}}" in str(left)
+    assert_allclose(
+        read(path, column={"dolp": name})["dolp"], np.array([0.1, 0.2]) / (100 if "%" in name else 1)
+    )
+
+
+def test_rows_that_cannot_be_are_left_out_where_asked(text_file):
+    path = text_file(f"{STATED}theta_i,theta_r,phi,I\n90,20,0,0.3\n30,20,0,0.3\n")
+    with pytest.raises(DataError, match=r"line 5: .*\(90°\).*leave such rows out with skip_invalid=True"):
+        read(path)
+    assert read(path, skip_invalid=True).sizes["geometry"] == 1
+    with pytest.raises(DataError, match=r"is not in \[0°, 90°\)$"):
+        read(text_file(f"{STATED}theta_i,theta_r,phi,I\n90,20,0,0.3\n"))

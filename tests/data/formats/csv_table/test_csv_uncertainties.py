@@ -221,3 +221,45 @@ def test_names_of_any_length_are_read_in_no_time(text_file):
 def test_uncertainties_of_a_reflectance_factor_called_r(text_file, name):
     ds = read(text_file(f"# azimuth: forward=0\ntheta_i,theta_r,phi,R,{name}\n30,20,0,0.9,0.02\n"))
     assert_allclose(ds["I_std"], [0.02])
+
+
+@pytest.mark.parametrize("name", ["2 sigma", "2 SD", "3 sigma", "2 sigma BRDF", "2sigma"])
+def test_multiples_of_sigma_in_two_words_are_divided(text_file, name):
+    ds = read(text_file(f"{STATED}theta_i,theta_r,phi,BRDF,{name}\n30,20,0,0.3,0.06\n"))
+    assert_allclose(ds["I_std"], 0.06 / int(name[0]))
+
+
+def test_uncertainties_above_the_values_are_rather_per_cent(text_file):
+    path = text_file(f"{STATED}theta_i,theta_r,phi,I,unc\n30,20,0,0.3,5\n30,30,0,0.4,5\n")
+    (said,) = check(read(path))
+    assert "state unit={'unc': '%'}" in str(said)
+    ds = read(path, unit={"unc": "%"})
+    assert_allclose(ds["I_std"], [0.015, 0.02])
+    assert check(ds) == []
+
+
+def test_small_letters_beside_a_capital_intensity_may_be_shares(text_file):
+    path = text_file(f"{STATED}theta_i,theta_r,phi,I,q,u\n30,20,0,0.3,0.1,0.2\n")
+    said = [str(issue) for issue in check(read(path))]
+    assert [f"column={{'{v}_over_I': '{v.lower()}'}}" in s for v, s in zip("QU", said, strict=True)] == [
+        True
+    ] * 2
+    ds = read(path, column={"Q_over_I": "q", "U_over_I": "u"})
+    assert_allclose(ds["Q_over_I"], [0.1])
+    assert check(ds) == []
+    assert check(read(text_file(f"{STATED}theta_i,theta_r,phi,i,q,u\n30,20,0,0.3,0.1,0.2\n"))) == []
+
+
+def test_names_in_tex(text_file):
+    ds = read(text_file(
+        f"{STATED}$\\theta_i$ (deg),$\\theta_r$ (deg),$\\phi$ (deg),$f_r$ (sr$^{{-1}}$),$\\sigma_{{f_r}}$\n"
+        "30,20,0,0.3,0.01\n"
+    ))  # fmt: skip
+    assert_allclose(ds["I"], [0.3])
+    assert_allclose(ds["I_std"], [0.01])
+
+
+@pytest.mark.parametrize("name", ["$U$", "U:", "U 1/sr", "U [1/sr]"])
+def test_u_in_any_dress_is_asked_about(text_file, name):
+    with pytest.raises(DataError, match="may be the Stokes parameter U or an expanded uncertainty"):
+        read(text_file(f"{STATED}theta_i,theta_r,phi,BRDF,{name}\n30,20,0,0.3,0.01\n"))

@@ -260,3 +260,16 @@ def test_values_in_arbitrary_units_have_an_arbitrary_scale(text_file):
     assert "scale" not in read(text_file(f"{STATED}theta_i,theta_r,phi,BRDF (1/sr)\n30,20,0,7\n")).attrs
     stated = read(text_file(f"{STATED}theta_i,theta_r,phi,BRDF (a.u.)\n30,20,0,7\n"), scale="absolute")
     assert stated.attrs["scale"] == "absolute"
+
+
+def test_angles_of_polarisation_in_radians_are_noticed(text_file):
+    rows = "".join(f"30,{10 * i},0,0.3,0.2,{a}\n" for i, a in enumerate((1.57, 1.5, -1.2, 0.3, 0.2, 0.1)))
+    path = text_file(
+        f"# quantity: brdf\n# azimuth: forward=0\n# stokes: p-s\ntheta_i,theta_r,phi,I,DoLP,AoLP\n{rows}"
+    )
+    (said,) = check(read(path))
+    assert "state unit={'aolp': 'rad'}" in str(said)
+    ds = read(path, unit={"aolp": "rad"})
+    assert_allclose(ds["aolp"][0], 1.57)
+    assert check(ds) == []
+    assert check(read(path, unit={"aolp": "deg"})) == []

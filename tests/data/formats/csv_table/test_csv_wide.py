@@ -92,3 +92,31 @@ def test_a_white_panel(measured):
     peak = at.isel(geometry=int(np.argmax(at["I"].values)))
     assert float(peak["phi"]) == 0.0
     assert abs(np.rad2deg(float(peak["theta_r"])) - 60) <= 2
+
+
+@pytest.mark.parametrize(
+    ("names", "divisor"),
+    [
+        ("BRDF 450 nm,BRDF 550 nm,U 450 nm (k=2),U 550 nm (k=2)", 2),
+        ("BRDF 450 nm,BRDF 550 nm,U(BRDF 450 nm) (k=2),U(BRDF 550 nm) (k=2)", 2),
+        ("BRDF 450 nm,BRDF 550 nm,u(BRDF 450 nm),u(BRDF 550 nm)", 1),
+        ("450 nm,550 nm,u(450 nm),u(550 nm)", 1),
+        ("450 nm,550 nm,unc (k=2) 450 nm,unc (k=2) 550 nm", 2),
+        ("BRDF(450),BRDF(550),std(450),std(550)", 1),
+    ],
+)
+def test_uncertainties_with_the_wavelength_in_brackets(text_file, names, divisor):
+    ds = read(text_file(f"{STATED}theta_i,theta_r,phi,{names}\n30,20,0,0.3,0.4,0.01,0.02\n"), quantity="brdf")
+    assert_allclose(ds["I"], [0.3, 0.4])
+    assert_allclose(ds["I_std"], np.array([0.01, 0.02]) / divisor)
+    assert check(ds) == []
+
+
+def test_intensities_with_the_wavelength_in_brackets_stay_intensities(text_file):
+    ds = read(
+        text_file(f"{STATED}# stokes: p-s\ntheta_i,theta_r,phi,I (450 nm),Q (450 nm),I (550 nm),Q (550 nm)\n"
+                  "30,20,0,0.3,0.1,0.4,0.2\n"),
+        quantity="brdf",
+    )  # fmt: skip
+    assert_allclose(ds["I"], [0.3, 0.4])
+    assert_allclose(ds["Q"], [0.1, 0.2])

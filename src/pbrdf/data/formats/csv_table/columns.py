@@ -236,7 +236,9 @@ class _Resolution:
         if text == "u" and unit is not None and unit.kind in ("share", "per steradian"):
             return replace(name, variable=None, key="", uncertainty="standard")
         if text.islower():
-            beside = "" if text == "v" else ", or with column={'I_std': 'u'} if it is an uncertainty"
+            beside = (
+                "" if text == "v" else f", or with column={{'I_std': {name.text!r}}} if it is an uncertainty"
+            )
             self._say(
                 index,
                 f"the column {name.text!r} is not taken for the Stokes parameter {text.upper()}, as there is no Q; if "
@@ -244,7 +246,7 @@ class _Resolution:
             )
             return _renamed(name, None)
         other = "an expanded uncertainty" if text == "U" else "a voltage"
-        use = " (then column={'I_std': 'U'} with coverage=2 or what k is)" if text == "U" else ""
+        use = f" (then column={{'I_std': {name.text!r}}} with coverage=2 or what k is)" if text == "U" else ""
         raise DataError(
             f"{self.path}: the column {name.text!r} may be the Stokes parameter {text} or {other}{use}; say "
             f"column={{{text!r}: {name.text!r}}}, or leave it out with ignore=[{name.text!r}]"
@@ -408,6 +410,7 @@ class _Resolution:
                     f"{', that of theta_i for the mirror direction' if variable == 'theta_r' else ''}. "
                     f"The columns are {', '.join(self.table.names)}"
                 )
+        self._small_letters()
         name = self.columns["I"].name if "I" in self.columns else Name("")
         if name.key in GUESSED and self.header.quantity is None:
             self.assumptions.append(
@@ -415,10 +418,28 @@ class _Resolution:
                 "else, state the quantity"
             )
 
+    def _small_letters(self) -> None:
+        """Say that q and u beside I, which are often Q/I and U/I, were not taken for those."""
+        intensity = self.columns.get("I")
+        if intensity is None or _bare(intensity.name) in ("i", "s0") or "I" in self.mapping:
+            return
+        for variable in "QUV":
+            column = self.columns.get(variable)
+            if column is None:
+                continue
+            if _bare(column.name) in ("q", "u", "v", "s1", "s2", "s3") and variable not in self.mapping:
+                self.remarks.append(
+                    f"the column {column.name.text!r} was taken for {variable}, in the unit of I; if it is divided by "
+                    f"the intensity, state column={{'{variable}_over_I': {column.name.text!r}}}"
+                )
+
 
 def _bare(name: Name) -> str:
     """A name without what stands in brackets or after a separator."""
-    return re.split(r"[\[({/,]", name.text)[0].strip()
+    text = re.split(r"[\[({/,]", name.text)[0].strip()
+    if len(name.key) == 1 and not name.uncertainty:  # "$U$", "U 1/sr"
+        return next((letter for letter in text if letter.lower() == name.key), text)
+    return text
 
 
 def _may_be_expanded(name: Name) -> bool:

@@ -26,10 +26,33 @@ _SAMPLE_WORDS = frozenset(
     ("name", "id", "label", "part", "piece", "object", "run", "scan", "side", "position", "day")
 )
 _WAVELENGTH = re.compile(
-    r"wavelen|wavenum|lambda|(?<![a-z])(?:wl|wvl)(?![a-z])|filter|spectral|colou?r(?![a-z])"
+    r"wavelen|wavenum|photon|frequency|lambda|(?<![a-z])(?:wl|wvl)(?![a-z])|filter|spectral|colou?r(?![a-z])"
 )
 _BAND = frozenset(("band", "bands", "channel", "filter", "color", "colour", "laser", "led", "rgb"))
 _POLARIZATION = re.compile(r"polari[sz]ation|(?<![a-z])pol(?![a-z])|polstate|illumination")
+#: Bounds of an interval, and other words for how well values are known.
+_BOUND = frozenset(
+    [
+        "lower",
+        "upper",
+        "low",
+        "high",
+        "lcl",
+        "ucl",
+        "lci",
+        "uci",
+        "ci",
+        "ci95",
+        "cl",
+        "lowerbound",
+        "upperbound",
+    ]
+)
+_BOUND |= {"snr", "rsd", "precision", "accuracy", "tolerance"}
+#: Combined and relative uncertainties, written u_c, u_r, u_rel.
+_COMBINED = re.compile(r"u[\s_.]*(c|r|rel|c95)")
+#: Degrees of polarisation that may be of all of it or of the linear part.
+_DEGREE = re.compile(r"p|dop|dp|polari[sz]ation|(degree(of)?|percent)polari[sz]ation|polari[sz]ationdegree")
 _SHOWN = 5
 
 
@@ -63,6 +86,16 @@ def remark_on(table: Table, name: Name, index: int, measured: Sequence[str]) -> 
         return _remark_on_uncertainty(name, measured, leave)
     words = set(re.split(r"[\s_.\-]+", lowered))
     values = distinct(table, index)
+    if words & _BOUND or _COMBINED.fullmatch(lowered.strip()):
+        return (
+            f"the column {text!r} looks like a statement of uncertainty and is not used: make it a standard "
+            f"uncertainty in a column I_std (or that of another value), or {leave}"
+        )
+    if _DEGREE.fullmatch(name.key) and all(re.match(r"[-+.\d]|nan|$", value) for value in values):
+        return (
+            f"the column {text!r} looks like a degree of polarisation and is not used; if it is that of linear "
+            f"polarisation, use it with column={{'dolp': {text!r}}}, or {leave}"
+        )
     if len(values) < 2:
         return None
     shown = ", ".join(values[:_SHOWN]) + (" …" if len(values) > _SHOWN else "")

@@ -63,7 +63,7 @@ _SYNONYMS = {
     "azimutho azimuthout azimuthv azimuthview azimuthviewing azir azio aziout viewazimuth viewingazimuth "
     "sensorazimuth detectorazimuth observerazimuth observationazimuth reflectedazimuth reflectionazimuth "
     "outgoingazimuth exitazimuth scatterazimuth vaa azimuthreflected azimuthdetector measureazimuth receiverazimuth",
-    "wavelength": "lambda lam wl wvl wavelen wavelengths wavenumber",
+    "wavelength": "lambda lam wl wvl wavelen wavelengths wave wavenumber",
     "group": "position cameraposition",
     "I": "s0 intensity brdf bsdf fr reflectancefactor bidirectionalreflectancefactor brf radiancefactor reflectance "
     "radiance dn",
@@ -137,7 +137,8 @@ _VAGUE = frozenset(_VAGUE_WORDS.split())
 _FILLERS = frozenset(
     ("stokes", "parameter", "measured", "panel", "value", "values", "mean", "average", "avg")
 )
-_ELEMENT = re.compile(r"(?:m|mueller|mm)[ _]?[\[({]?(\d)[\])},;\s_]*[\[({]?(\d)[\])}]?")
+#: Elements of scattering matrices are called S, F or Z, those of BRDFs f_r.
+_ELEMENT = re.compile(r"(?:m|mueller|mm|s|f|f_?r|z)[ _]?[\[({]?(\d)[\])},;\s_]*[\[({]?(\d)[\])}]?")
 _DIFFERENTIAL = re.compile(r"d_?([IQUVR]|S[0-3]|BRDF|brdf|DoLP|dolp|DOLP|AoLP|aolp)")
 _CODED = re.compile(r"(?:(u)|(U))_?(95|k\d)?")  # u or U, U95, U_k2
 
@@ -187,7 +188,7 @@ class _Parts:
     """A name while it is taken apart."""
 
     def __init__(self, name: str) -> None:
-        self.rest = plain_text(name)
+        self.rest = _without_tex(plain_text(name))
         self.unit: str | None = None
         self.coverage: float | None = None
         self.expanded = self.standard = self.relative = False
@@ -275,7 +276,7 @@ def parse_name(name: str) -> Name:
     """Take a column's name apart; see :class:`Name`. One longer than any name is said to be none that is understood."""
     if len(name) > LONGEST:
         return Name(name)
-    text = plain_text(name)
+    text = _without_tex(plain_text(name))
     if (ratio := ratio_variable(text)) is not None:
         return Name(name, ratio, key=ratio)
     element = _ELEMENT.fullmatch(text.lower())
@@ -313,6 +314,11 @@ def parse_name(name: str) -> Name:
         name, variable, unit, quantity, key, kind, parts.coverage, relative, elevation,
         (int(indices[1]), int(indices[2])) if indices else None,
     )  # fmt: skip
+
+
+def _without_tex(text: str) -> str:
+    """``$\\sigma_{f_r}$`` as sigma_f_r."""
+    return re.sub(r"_\{([^{}]*)\}", r"_\1", re.sub(r"[$\\]", "", text))
 
 
 def _element(name: str, i: int, j: int) -> Name:
@@ -358,6 +364,7 @@ def _all_words(text: str) -> set[str]:
 
 def _uncertainty(words: list[str], parts: _Parts) -> tuple[str | None, list[str]]:
     """The kind of uncertainty that the words speak of, and those left that say of what."""
+    words = _with_multiples(words)
     lowered = [word.lower() for word in words]
     joined = "".join(words)
     if match := _DIFFERENTIAL.fullmatch("_".join(words)) or _DIFFERENTIAL.fullmatch(joined):
@@ -410,6 +417,17 @@ def _uncertainty(words: list[str], parts: _Parts) -> tuple[str | None, list[str]
     if parts.expanded and words:
         return "expanded", [w for w, low in zip(words, lowered, strict=True) if low not in ("u", "u95")]
     return None, words
+
+
+def _with_multiples(words: list[str]) -> list[str]:
+    """The words with ``2 sigma`` as one."""
+    joined: list[str] = []
+    for word in words:
+        if joined and re.fullmatch("sigma|sd|std", word.lower()) and re.fullmatch(r"[1-9]", joined[-1]):
+            joined[-1] += word
+        else:
+            joined.append(word)
+    return joined
 
 
 def _is_owner(text: str) -> bool:

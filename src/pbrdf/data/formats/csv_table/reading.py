@@ -151,7 +151,15 @@ def read_rows(
     remember(ds, _origin(table, resolved, read, widened, ignore))
     if skip_invalid:
         ds = _without_invalid(ds)
-    validate(ds, origin=table.origin)
+    try:
+        validate(ds, origin=table.origin)
+    except DataError as error:
+        usable = _without_invalid(ds)
+        if not 0 < usable.sizes["geometry"] < ds.sizes["geometry"] or any(
+            issue.severity == "error" for issue in check(usable)
+        ):
+            raise
+        raise DataError(f"{error}; leave such rows out with skip_invalid=True") from None
     origin = origin_of(ds)
     assert origin is not None
     return ds, list(origin.lines)

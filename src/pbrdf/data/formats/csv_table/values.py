@@ -25,6 +25,8 @@ __all__ = ["Values", "values_of"]
 
 #: A median of DoLP above this, of so many values, is no fraction; single values may be, of a noisy measurement.
 _NO_FRACTION, _MANY = 1.5, 5
+#: Degrees below which all angles of polarisation are rather radians, which end at π/2 or, counted from 0, at π.
+_RADIANS = 3.2
 #: A median reflectance factor above this is rather per cent.
 _PER_CENT = 5.0
 #: Wavelengths of light, nm.
@@ -173,6 +175,13 @@ class _Conversion:
                     )
                 raise self._refusal(column, unit, "deg or rad")
         degrees = self.header.degrees if unit is None else unit.kind == "degrees"
+        if column.variable == "aolp" and unit is None and degrees:
+            largest = float(np.nanmax(np.abs(values), initial=0.0))
+            if 0.45 * np.pi < largest < _RADIANS and values.size >= _MANY:
+                self.remarks.append(
+                    f"all angles of polarisation are below {largest:.3g}°: were radians taken for degrees? "
+                    "state unit={'aolp': 'rad'}, or unit={'aolp': 'deg'} if it is right"
+                )
         text = "deg" if degrees else "rad"
         if unit is not None:
             text = unit.text
@@ -216,9 +225,9 @@ class _Conversion:
             odd = finite.min() if finite.min() < _SHORTEST else finite.max()
             why = ""
             if unit is None and 0.1 <= odd < _SHORTEST:
-                why = "; if the file has µm, state unit={'wavelength': 'um'}"
+                why = " If the file has µm, state unit={'wavelength': 'um'}"
             elif unit is None and odd < 1e-4:
-                why = "; if the file has m, state unit={'wavelength': 'm'}"
+                why = " If the file has m, state unit={'wavelength': 'm'}"
             self.remarks.append(
                 f"{odd:g} nm is no wavelength of light: was another unit taken for nm?{why or ' '}".strip()
             )
@@ -389,7 +398,21 @@ class _Conversion:
                     factor, _ = self._radiometric(column)
             if factor != 1.0:
                 values = _times(values, factor)
+            self._doubt(column, values, name.uncertainty)
         return self._divided(column, values, words)
+
+    def _doubt(self, column: Column, values: NDArray[np.float64], kind: str | None) -> None:
+        """Say that an uncertainty of I without a unit, larger than I itself, is rather per cent."""
+        intensity = self.arrays.get("I")
+        if column.variable != "I_std" or column.unit is not None or kind == "variance" or intensity is None:
+            return
+        both = np.isfinite(values) & np.isfinite(intensity)
+        if both.any() and np.median(values[both]) > np.median(np.abs(intensity[both])):
+            name = self._name(column)
+            self.remarks.append(
+                f"the uncertainties of the column {name!r} are larger than the values: if they are relative, in per "
+                f"cent, state unit={{{name!r}: '%'}}"
+            )
 
     def _divided(self, column: Column, values: NDArray[np.float64], words: list[str]) -> NDArray[np.float64]:
         """The standard uncertainty, of an expanded one."""

@@ -121,12 +121,23 @@ def _wavelength(name: str) -> tuple[str, float] | None:
         if match is None:
             return None
     wavelength = round(float(match["number"]) * factor, 6)
-    before, after = match["before"].strip(" _-@([:,"), match["after"].strip(" _-)]:,")
+    before = match["before"].strip(" _-@([:,")
+    after = match["after"].strip(" _-:,")
+    if after.count("(") < after.count(")") or after.count("[") < after.count("]"):
+        after = after.rstrip(")]")
     if not (_SHORTEST <= wavelength <= _LONGEST):
         return None
     if re.fullmatch(r"(?i)(wavelength|wl|wvl|lambda)?", before):
         before = ""
     kind = "_".join(part for part in (before, after) if part) or _VALUE
+    # u(450 nm) and u(BRDF 450 nm) are uncertainties of what is called 450 nm and BRDF 450 nm
+    if around := re.fullmatch(r"(\w[\w ]*?)\s*[(\[]([^)\]]*)", text[: match.start("number")]):
+        owner = around[2].strip(" _-@,") or _VALUE
+        wrapped = f"{around[1]}({owner})" + (f"_{after}" if after else "")
+        if parse_name(wrapped).uncertainty and (
+            around[2].strip() or parse_name(around[1]).variable not in ("I", "Q")
+        ):
+            kind = wrapped
     if parse_name(kind).key == "" and parse_name(kind).uncertainty:
         kind = f"{_VALUE}_{kind}"
     return (kind, wavelength) if parse_name(kind).variable in CHANNELS else None
