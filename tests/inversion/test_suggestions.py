@@ -100,10 +100,10 @@ def exchanged(ds, a, b):
 WRONG = {
     "azimuth": (lambda ds: ds.assign_coords(phi=ds["phi"] + math.pi), "--azimuth forward=180"),
     "stokes": (lambda ds: ds.assign(Q=-ds["Q"], U=-ds["U"]), "--stokes s-p"),
-    "Q and U": (lambda ds: exchanged(ds, "Q", "U"), "the columns of Q and U exchanged"),
+    "Q and U": (lambda ds: exchanged(ds, "Q", "U"), "Q and U exchanged in the file"),
     "normalised": (
         lambda ds: ds.assign(Q=ds["Q"] / ds["I"], U=ds["U"] / ds["I"]),
-        "the columns of Q and U as Q/I",
+        "Q and U as Q_over_I",
     ),
     "cosine of the viewer": (
         lambda ds: ds.assign({c: ds[c] * np.cos(ds["theta_r"]) for c in "IQU"}),
@@ -119,7 +119,7 @@ WRONG = {
         lambda ds: ds.assign_coords(
             theta_i=("geometry", ds["theta_r"].values), theta_r=("geometry", ds["theta_i"].values)
         ),
-        "the columns of both angles exchanged",
+        "both exchanged in the file",
     ),
     "elevation of the viewer": (
         lambda ds: ds.isel(geometry=ds["theta_r"].values > 0.0).pipe(
