@@ -100,10 +100,10 @@ def exchanged(ds, a, b):
 WRONG = {
     "azimuth": (lambda ds: ds.assign_coords(phi=ds["phi"] + math.pi), "--azimuth forward=180"),
     "stokes": (lambda ds: ds.assign(Q=-ds["Q"], U=-ds["U"]), "--stokes s-p"),
-    "Q and U": (lambda ds: exchanged(ds, "Q", "U"), "the columns of Q and U exchanged"),
+    "Q and U": (lambda ds: exchanged(ds, "Q", "U"), "Q and U exchanged in the file"),
     "normalised": (
         lambda ds: ds.assign(Q=ds["Q"] / ds["I"], U=ds["U"] / ds["I"]),
-        "the columns of Q and U as Q/I",
+        "Q and U as Q_over_I",
     ),
     "cosine of the viewer": (
         lambda ds: ds.assign({c: ds[c] * np.cos(ds["theta_r"]) for c in "IQU"}),
@@ -119,7 +119,7 @@ WRONG = {
         lambda ds: ds.assign_coords(
             theta_i=("geometry", ds["theta_r"].values), theta_r=("geometry", ds["theta_i"].values)
         ),
-        "the columns of both angles exchanged",
+        "both exchanged in the file",
     ),
     "elevation of the viewer": (
         lambda ds: ds.isel(geometry=ds["theta_r"].values > 0.0).pipe(
@@ -185,7 +185,7 @@ def test_reflectance_factors_in_per_cent_are_found():
     per_cent = per_cent.assign_attrs(quantity="reflectance_factor")
     result = pbrdf.fit(per_cent, starts=4)
     found = contradicted_conventions(per_cent, result, {}, until=math.inf)
-    assert found[0].option == "values divided by 100"
+    assert found[0].option == "values divided by 100 in the file"
 
 
 def test_assumed_conventions_are_tried_first():
@@ -234,7 +234,7 @@ def test_ratios_have_readings_of_sign_and_per_cent_and_none_of_scale():
             ds[name].values if ds[name].ndim == 1 else ds[name].values[:, 1, 0] for ds in (dataset, swapped)
         )
         np.testing.assert_array_equal(again, -q)
-        pbrdf.validate(change["the ratios divided by 100"](dataset))
+        pbrdf.validate(change["the ratios divided by 100 in the file"](dataset))
 
 
 @pytest.mark.slow
@@ -320,3 +320,31 @@ def test_checks_ask_for_advice_only_where_the_fit_is_not_good():
         "The data contradict the way they were read: with forward at the other"
     )
     assert checks.record(result)["conventions"][0]["option"].startswith("--azimuth forward=180")
+
+
+def test_options_name_the_columns_of_the_file(tmp_path):
+    """What is advised works when it is typed: columns by their names, in quotation marks where a shell needs them."""
+    path = tmp_path / "paint.csv"
+    path.write_text("# quantity: brdf\ntheta_i,theta_r,I,Q,my U\n30,-20,0.4,0.01,0\n30,40,0.5,0.02,0.001\n")
+    dataset = pbrdf.read(path, column={"U": "my U"})
+    options = {option.split(" (")[0]: change for option, _, change in readings(dataset)}
+    exchanged = pbrdf.read(path, column={"Q": "my U", "U": "Q"})
+    np.testing.assert_array_equal(
+        options["--column 'Q=my U' --column U=Q"](dataset)["Q"].values, exchanged["Q"].values
+    )
+    assert "--column Q_over_I=Q --column 'U_over_I=my U'" in options
+    assert "--column theta_i=theta_r --column theta_r=theta_i" in options
+    # signed angles without an azimuth: the option counts there too
+    turned = pbrdf.read(path, column={"U": "my U"}, azimuth="forward=180")
+    found = options["--azimuth forward=180"](dataset)
+    np.testing.assert_allclose(np.cos(found["phi"]), np.cos(turned["phi"]), atol=1e-12)
+    assert not [option for option in options if "…" in option]
+
+
+def test_ratios_in_per_cent_name_the_option_of_their_unit(tmp_path):
+    path = tmp_path / "shares.csv"
+    path.write_text("theta_i,theta_r,phi,Q_over_I,U_over_I\n30,20,0,0.10,0.01\n30,40,0,0.20,0.02\n")
+    dataset = pbrdf.read(path)
+    change = {option: how for option, _, how in readings(dataset)}["--unit Q_over_I=% --unit U_over_I=%"]
+    stated = pbrdf.read(path, unit={"Q_over_I": "%", "U_over_I": "%"})
+    np.testing.assert_allclose(change(dataset)["Q_over_I"], stated["Q_over_I"])

@@ -8,6 +8,7 @@ the same model fitted to the changed data tells by its χ² whether they make mo
 from __future__ import annotations
 
 import math
+import shlex
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -15,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pbrdf.data import conventions
+from pbrdf.data.origin import origin_of
 from pbrdf.data.schema import COVARIANCE, RATIOS
 from pbrdf.inversion.noise import NoiseModel
 from pbrdf.inversion.plausibility import Finding, Severity
@@ -34,8 +36,8 @@ LARGE = 3.0
 CONTRADICTED = 0.5
 #: … and the verdict becomes a better one, or χ² falls to this share.
 PLAINLY = 0.1
-#: Time for all trials, seconds.
-TIME = 10.0
+#: Time for all trials, seconds: some 5 of work, on a machine that does other things too.
+TIME = 25.0
 #: A reading that leaves this share of χ², by which the model describes the data, is the right one: no more are tried.
 _FOUND = 0.02
 #: Geometries of a trial at most, and its starts: another reading has its optimum elsewhere.
@@ -132,8 +134,7 @@ def readings(dataset: xr.Dataset) -> Iterator[tuple[str, str, _Change]]:
     found: list[_Reading] = []
     if (dataset["theta_r"].values > 0.0).any():
         stated = "azimuth" not in assumed and "phi = 0" not in assumed
-        option = "theta_r of the other sign" if "no azimuth" in assumed else "--azimuth forward=180"
-        option += " (or forward=0 if that was stated)" if stated else ""
+        option = "--azimuth forward=180" + (" (or forward=0 if that was stated)" if stated else "")
         found.append((stated, option, "with forward at the other end of the azimuth", _azimuth))
     if any(name in dataset for name in (*_SIGNED, *_MATRICES, "aolp")):
         stated = "Q > 0" not in assumed
@@ -141,44 +142,65 @@ def readings(dataset: xr.Dataset) -> Iterator[tuple[str, str, _Change]]:
         found.append((stated, option, "with Q and U of the other sign", _stokes))
     for q, u in (("Q", "U"), ("Q_over_I", "U_over_I")):
         if q in dataset and u in dataset:
-            option = f"the columns of {q} and {u} exchanged (--column {q}=… --column {u}=…)"
+            option = _column_options(dataset, {q: u, u: q}) or f"{q} and {u} exchanged in the file"
             found.append((True, option, f"with {q} and {u} exchanged", _exchanged(q, u)))
             option = "the sign of U or of phi changed in the file"
             found.append((True, option, "with the azimuth counted the other way", _mirrored))
     if "Q" in dataset and "U" in dataset and COVARIANCE not in dataset:
-        option = "the columns of Q and U as Q/I and U/I"
+        option = (
+            _column_options(dataset, {"Q_over_I": "Q", "U_over_I": "U"}) or "Q and U as Q_over_I and U_over_I"
+        )
         found.append((True, option, "with Q and U taken as Q/I and U/I", _normalised))
     theta_i, theta_r = dataset["theta_i"].values, dataset["theta_r"].values
     if max(theta_i.max(), theta_r.max()) < _SMALL:
         found.append((False, "--angles radians", "with angles in radians", _in_radians))
-    option = "the columns of both angles exchanged (--column theta_i=… --column theta_r=…)"
+    option = (
+        _column_options(dataset, {"theta_i": "theta_r", "theta_r": "theta_i"}) or "both exchanged in the file"
+    )
     found.append((True, option, "with θ_i and θ_r exchanged", _exchanged("theta_i", "theta_r")))
-    for names in (("theta_r",), ("theta_i",), ("theta_i", "theta_r")):
-        if all((dataset[name].values > 0.0).all() for name in names):
-            whose = " and ".join(names)
-            option = f"{whose} as 90° minus the elevation in the file"
-            found.append((True, option, f"with {whose} taken as elevation", _elevation(names)))
     if "I" in dataset or "mueller" in dataset:
         found.append((True, "--cosine-weighted", "divided by cos θ_r", _divided_by_cosine))
         found.append((True, "--not-cosine-weighted", "multiplied by cos θ_r", _multiplied_by_cosine))
         if dataset.attrs.get("scale") != "arbitrary":
             found += _scales(dataset.attrs.get("quantity"))
+    for names in (("theta_r",), ("theta_i",), ("theta_i", "theta_r")):
+        if all((dataset[name].values > 0.0).all() for name in names):
+            whose = " and ".join(names)
+            option = f"{whose} as 90° minus the elevation in the file"
+            found.append((True, option, f"with {whose} taken as elevation", _elevation(names)))
     ratios = [name for name in _SHARES if name in dataset and np.nan_to_num(dataset[name].values).any()]
     if ratios:
         what = "DoLP" if ratios == ["dolp"] else "the ratios"
-        found.append((True, f"{what} divided by 100", f"with {what} taken as per cent", _ratios_in_percent))
+        option = _unit_options(dataset, ratios) or f"{what} divided by 100 in the file"
+        found.append((True, option, f"with {what} taken as per cent", _ratios_in_percent))
     for _, option, words, change in sorted(found, key=lambda item: item[0]):
         yield option, words, change
+
+
+def _column_options(dataset: xr.Dataset, taken: Mapping[str, str]) -> str:
+    """Options that take variables from the columns of others; empty where the file has no such columns."""
+    origin = origin_of(dataset)
+    columns = origin.columns if origin is not None else {}
+    if any(source not in columns for source in taken.values()):
+        return ""
+    return " ".join(f"--column {shlex.quote(f'{name}={columns[source]}')}" for name, source in taken.items())
+
+
+def _unit_options(dataset: xr.Dataset, ratios: Sequence[str]) -> str:
+    """Options by which ratios are per cent; empty where the file has no columns of them."""
+    origin = origin_of(dataset)
+    columns = origin.columns if origin is not None else {}
+    return " ".join(f"--unit {name}=%" for name in ratios) if all(name in columns for name in ratios) else ""
 
 
 def _scales(quantity: str | None) -> Iterator[_Reading]:
     """Readings of another quantity or unit, where the scale of the values means something."""
     if quantity in ("brdf", "reflectance_factor"):
-        yield True, "values divided by 100", "taken as per cent", _times(0.01)
+        yield True, "values divided by 100 in the file", "taken as per cent", _times(0.01)
         yield True, "--quantity radiance", "divided by cos θ_i", _divided_by_source_cosine
     if quantity == "brdf":
         yield True, "--quantity reflectance_factor", "divided by π", _times(1.0 / math.pi)
-        yield True, "values multiplied by π", "multiplied by π", _times(math.pi)
+        yield True, "values multiplied by π in the file", "multiplied by π", _times(math.pi)
     if quantity == "reflectance_factor":
         yield True, "--quantity brdf", "multiplied by π", _times(math.pi)
 

@@ -47,6 +47,17 @@ def test_the_format_line_states_unit_and_scale(text_file):
     assert_allclose(ds["I"][-1], 0.12)
 
 
+def test_comments_blanks_and_commas_do_not_matter(text_file):
+    plain = read(text_file(SMALL, "paint.fred"))
+    dressed = (
+        "// by hand\n! and for a friend\n\n"
+        + SMALL.replace("=", " = ").replace("30 90 0.030", "  30 ,\t90, 0.030 ").upper()
+    )
+    other = read(text_file(dressed, "other.txt"))
+    for name in ("theta_i", "theta_r", "phi", "I"):
+        assert_array_equal(other[name], plain[name])
+
+
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [

@@ -228,3 +228,35 @@ def test_one_colour_alone(tmp_path):
     np.testing.assert_array_equal(found(frames, one)["f"], expected)
     with pytest.raises(DataError, match="color is 'G2': use one of R, G, B; with greens"):
         file_of(tmp_path, 'kind = "preset"\npreset = "sony_imx250myr"\ncolor = "G2"')
+
+
+PIXELS = '[["R", "R", "G", "G"], ["R", "R", "G", "G"], ["G", "G", "B", "B"], ["G", "G", "B", "B"]]'
+REPEATED = "[[90, 45, 90, 45], [135, 0, 135, 0], [90, 45, 90, 45], [135, 0, 135, 0]]"
+
+
+@pytest.mark.parametrize(
+    ("layout", "colors"),
+    [
+        (REPEATED, '[["R", "G"], ["G", "B"]]'),
+        (REPEATED, PIXELS),
+        ("[[90, 45], [135, 0]]", PIXELS),
+    ],
+)
+def test_layouts_written_pixel_by_pixel_mix_no_colours(tmp_path, layout, colors):
+    instrument = file_of(
+        tmp_path, f'kind = "division_of_focal_plane"\nlayout = {layout}\ncolors = {colors}\ngreens = "joined"'
+    )
+    assert instrument.polarimeter.mosaic.shape == (2, 2)
+    assert instrument.polarimeter.filters.layout == (("R", "G"), ("G", "B"))
+    frames = opened(tmp_path, picture(noise=0.0), instrument)
+    means = found(frames, instrument)
+    assert [*means] == ["f_R", "f_G", "f_B"]
+    for name, stokes in means.items():
+        level, dolp = LIGHT[name[-1]]
+        assert stokes[0] == pytest.approx(level, rel=1e-3)
+        assert degrees(stokes) == pytest.approx(dolp, abs=2e-3)
+
+
+def test_a_grey_layout_stays_as_it_was_written(tmp_path):
+    instrument = file_of(tmp_path, f'kind = "division_of_focal_plane"\nlayout = {REPEATED}')
+    assert instrument.polarimeter.mosaic.shape == (4, 4)

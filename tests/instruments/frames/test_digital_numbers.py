@@ -185,6 +185,11 @@ def test_means_need_their_number():
         (np.array([40000, 33]), {"bits": 12}, "set bits = 16"),
         (np.array([40000, 32]), {"bits": 12}, 'set alignment = "left"'),
         (picture() << 4, {"bits": 8}, 'set bits = 12 and alignment = "left"'),
+        (
+            picture(bits=10) << 2,
+            {"bits": 10},
+            "10 bits in the upper end of 12: set bits = 12 and full_scale = 4092",
+        ),
         (np.array([5000.5]), {"bits": 12}, 'set bits = 13, .* or alignment = "left" if they are means'),
         (np.array([70000]), {"bits": 16}, "give numbers of 16 bits at most"),
         (np.array([-1], dtype=np.int16), {"bits": 12}, "a pixel reads -1"),

@@ -9,11 +9,13 @@ files in ``data/processed/fred``) and as FRED's own example script for VIAVI's d
 counted from the direction in which the incident light **travels**: equal azimuths are the specular half-plane, our
 φ = 0. In scans in the plane of incidence the polar angle is signed instead, the specular side positive: the files of
 one black paint for FRED and for Zemax have their peaks on that side, and the azimuths of the tables with
-``specAzi0d`` in their names say the same.
+``specAzi0d`` in their names say the same. Comments (``#``, ``//``, ``!``), blanks around ``=`` and commas between the
+numbers, as files edited by hand have them, do not matter.
 """
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +27,7 @@ from pbrdf.data.formats.scalar_rows import incidence_groups, scalar_rows
 
 __all__ = ["READER", "read_fred"]
 
+_COMMENTS = ("#", "//", "!")
 _ANGLES = {"deg": np.pi / 180.0, "degrees": np.pi / 180.0, "rad": 1.0, "radians": 1.0}
 
 
@@ -48,7 +51,7 @@ def read_fred(path: str | Path) -> xr.Dataset:
         Names the file and the line.
     """
     path = Path(path)
-    lines = NumberLines(path)
+    lines = NumberLines(path, comment=_COMMENTS)
     if lines.text("'type bsdf_data'").lower().split() != ["type", "bsdf_data"]:
         raise lines.error("the file does not begin with 'type bsdf_data'")
     unit, scale = _format(lines)
@@ -56,7 +59,7 @@ def read_fred(path: str | Path) -> xr.Dataset:
     where: list[int] = []
     incident: list[float] | None = None
     while lines.peek() is not None:
-        numbers = [lines.number_in(cell, "an angle or a value") for cell in lines.text("a row").split()]
+        numbers = [lines.number_in(cell, "an angle or a value") for cell in _cells(lines.text("a row"))]
         line = lines.read_line
         if len(numbers) == 2:
             incident = numbers
@@ -89,9 +92,15 @@ def read_fred(path: str | Path) -> xr.Dataset:
     )
 
 
+def _cells(line: str) -> list[str]:
+    """Numbers between blanks, commas, or both."""
+    return re.split(r"\s*,\s*|\s+", line)
+
+
 def _format(lines: NumberLines) -> tuple[float, float]:
     """Radians in a unit of the angles, and the factor of the values."""
-    words = lines.text("a line 'format angles=deg bsdf=value scale=1'").split()
+    line = lines.text("a line 'format angles=deg bsdf=value scale=1'")
+    words = re.sub(r"\s*=\s*", "=", line).split()
     if words[0].lower() != "format":
         raise lines.error("a line 'format angles=deg bsdf=value scale=1' was expected")
     stated = {}
@@ -111,7 +120,7 @@ def _format(lines: NumberLines) -> tuple[float, float]:
 
 
 def _begins_as_fred(path: Path) -> bool:
-    return begins_with(path, r"type\s+bsdf_data\b")
+    return begins_with(path, r"type\s+bsdf_data\b", comment=_COMMENTS)
 
 
 READER = Reader("fred", read_fred, extensions=(".txt", ".dat", ".bsdf", ".csv"), sniff=_begins_as_fred)

@@ -19,7 +19,7 @@ _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", re.ASCII)
 _HEAD = 4096
 
 
-def begins_with(path: Path, pattern: str, comment: str = "#") -> bool:
+def begins_with(path: Path, pattern: str, comment: str | tuple[str, ...] = "#") -> bool:
     """Whether the first line that is neither empty nor a comment matches a pattern, whatever its case."""
     head = first_bytes(path, _HEAD).decode("latin-1").removeprefix("ï»¿")
     for line in re.split(r"[\r\n]+", head):
@@ -43,7 +43,7 @@ class NumberLines:
     path
         The file.
     comment
-        How a comment begins; None if the file has none.
+        How a comment begins, in one way or several; None if the file has none.
     keep_empty
         Whether empty lines count, as they do where each line has its meaning by its place.
 
@@ -58,7 +58,9 @@ class NumberLines:
         If the file cannot be read as text.
     """
 
-    def __init__(self, path: Path, comment: str | None = "#", keep_empty: bool = False) -> None:
+    def __init__(
+        self, path: Path, comment: str | tuple[str, ...] | None = "#", keep_empty: bool = False
+    ) -> None:
         self.path = path
         self.comments: list[str] = []
         self._lines: list[tuple[int, str]] = []
@@ -66,7 +68,7 @@ class NumberLines:
         for number, line in enumerate(content, start=1):
             text = line.strip()
             if comment is not None and text.startswith(comment):
-                self.comments.append(text.lstrip(comment).strip())
+                self.comments.append(text.lstrip("".join(comment)).strip())
             elif text or keep_empty:
                 self._lines.append((number, text))
         self._end = len(content)

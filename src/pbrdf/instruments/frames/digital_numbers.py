@@ -255,6 +255,12 @@ def require_range(raw: np.ndarray, detector: Detector) -> None:
     zeros = trailing_zeros(raw) if raw.dtype.kind != "f" and largest < 2**_CONTAINER else 0
     if shift and zeros >= shift:
         remedy = f'all are multiples of {2**shift}, as of {bits} bits in the upper end of 16: set alignment = "left"'
+    elif zeros >= 2 and largest == (2**bits - 1) << zeros:
+        # 10 bits in the upper end of 12: nothing says that a converter of 14 stands in the upper end of 16
+        remedy = (
+            f"all are multiples of {2**zeros}, as of {bits} bits in the upper end of {bits + zeros}: set bits = "
+            f"{bits + zeros} and full_scale = {(2**bits - 1) << zeros}, and the gain that goes with them,"
+        )
     elif zeros >= 2 and np.unique(raw).size >= _ENOUGH:
         true = _CONTAINER - zeros
         remedy = (

@@ -20,7 +20,7 @@ import numpy as np
 
 from pbrdf.errors import DataError
 
-__all__ = ["BAYER", "ColorFilters"]
+__all__ = ["BAYER", "ColorFilters", "of_cells", "smallest_cell"]
 
 #: Colours of the cells of Sony's sensors.
 BAYER = (("R", "G"), ("G", "B"))
@@ -96,3 +96,34 @@ class ColorFilters:
         """Nominal wavelength of one of :attr:`places`, nanometres."""
         y, x = self.places[label][0]
         return self.wavelengths.get(self.layout[y][x])
+
+
+def smallest_cell(layout: np.ndarray) -> np.ndarray:
+    """The least part, from the corner, of which a table of polarisers is a repetition."""
+    tall, wide = layout.shape
+    for high in (n for n in range(1, tall + 1) if tall % n == 0):
+        for broad in (n for n in range(1, wide + 1) if wide % n == 0):
+            cell = layout[:high, :broad]
+            if np.array_equal(np.tile(cell, (tall // high, wide // broad)), layout):
+                return cell
+    return layout
+
+
+def of_cells(colors: tuple[tuple[str, ...], ...], cell: tuple[int, int]) -> tuple[tuple[str, ...], ...]:
+    """Colours of cells of polarisers, from a table that may name them pixel by pixel.
+
+    Parameters
+    ----------
+    colors
+        A table of cells, or one of pixels: the same name all over each cell.
+    cell
+        Rows and columns of pixels of a cell.
+    """
+    table = np.array(colors)
+    high, broad = cell
+    if cell == (1, 1) or table.shape[0] % high or table.shape[1] % broad:
+        return colors
+    cells = table[::high, ::broad]
+    if not np.array_equal(np.repeat(np.repeat(cells, high, axis=0), broad, axis=1), table):
+        return colors
+    return tuple(tuple(str(name) for name in row) for row in cells)

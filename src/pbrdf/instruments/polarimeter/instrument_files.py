@@ -24,7 +24,7 @@ from pbrdf.files.atomic import atomic_file
 from pbrdf.files.text import read_toml
 from pbrdf.instruments.polarimeter.analyzer_files import read_analyzer, write_analyzer
 from pbrdf.instruments.polarimeter.band import Band, cauchy, gaussian_band, in_band, read_band, top_hat_band
-from pbrdf.instruments.polarimeter.color_filters import BAYER, ColorFilters
+from pbrdf.instruments.polarimeter.color_filters import BAYER, ColorFilters, of_cells, smallest_cell
 from pbrdf.instruments.polarimeter.detector import Detector
 from pbrdf.instruments.polarimeter.instrument import FRAME_FILES, Instrument
 from pbrdf.instruments.polarimeter.mueller_polarimeter import dual_rotating_retarder
@@ -267,6 +267,9 @@ def _polarimeter(table: _Table, kind: str) -> Polarimeter:
         settings["axes"] = table.numbers("axes", 1, [0, 45])
     elif kind == "division_of_focal_plane":
         settings["layout"] = table.numbers("layout", 2)
+        if set(_COLORS) & set(table.content):
+            # else each colour would stand over several of its cells, and different ones in the picture
+            settings["layout"] = smallest_cell(settings["layout"])
     else:
         settings["angles"] = table.numbers("angles", 1)
     if kind == "rotating_retarder":
@@ -369,7 +372,10 @@ def _described(table: _Table, polarimeter: Polarimeter) -> Polarimeter:
             raise table.wrong("states", "a list of names in quotes, one for each state")
         polarimeter = replace(polarimeter, states=tuple(states))
     if set(_COLORS) & set(table.content):
-        polarimeter = replace(polarimeter, filters=_filters(table, polarimeter.filters))
+        filters = _filters(table, polarimeter.filters)
+        if polarimeter.mosaic is not None:
+            filters = replace(filters, layout=of_cells(filters.layout, polarimeter.mosaic.shape))
+        polarimeter = replace(polarimeter, filters=filters)
     if "accuracy" in table.content:
         content = table.content["accuracy"]
         if not isinstance(content, dict):
