@@ -67,5 +67,6 @@ def linear_fit(monkeypatch, matrix, measured, lower=-50.0, upper=50.0, std_known
         unknowns=best.x,
         information=matrix.T @ matrix,
         std_known=std_known,
+        settled=True,
         goodness=SimpleNamespace(data=count, free=size, chi2=chi2, reduced_chi2=chi2 / (count - size)),
     )

@@ -69,7 +69,10 @@ def test_a_fit_that_starts_at_the_truth_stays_near_it():
 @pytest.mark.slow
 def test_a_point_source_is_found_to_be_one():
     """The true radius lies on the bound: the lanes come to rest there or close by, none goes on for ever."""
-    result = pbrdf.fit(gloss(angle=None, source=None), nuisances=["source"], starts=16)
+    # wider lobes end in a valley without rhyme, of 800 times the χ²
+    result = pbrdf.fit(
+        gloss(angle=None, source=None), nuisances=["source"], starts=16, bounds={"sigma": (0.002, 0.03)}
+    )
     assert result.settled and result.converged == 16
     assert result.estimates["source"].value < 0.35 * DEGREE
     assert result.optima[0].chi2 == result.goodness.chi2

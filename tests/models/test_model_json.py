@@ -115,7 +115,7 @@ def test_files_that_cannot_be_read(tmp_path):
     with pytest.raises(ModelError, match=r"nowhere\.json: cannot be read as a model"):
         load_model(tmp_path / "nowhere.json")
     (tmp_path / "binary.json").write_bytes(b"\xff\xfe\x00\x80")
-    with pytest.raises(ModelError, match=r"binary\.json: cannot be read as a model"):
+    with pytest.raises(ModelError, match=r"binary\.json: not a text file, so not a model"):
         load_model(tmp_path / "binary.json")
 
 

@@ -194,7 +194,7 @@ def _workspace(path: Path) -> Iterator[Path]:
     try:
         yield space
     finally:
-        shutil.rmtree(space, ignore_errors=True)  # an error that matters is another one
+        _remove(space)
         if lock is not None:
             os.close(lock)
 
@@ -250,7 +250,7 @@ def _clear_up(path: Path) -> None:
                 continue
             if (space / _ASIDE).exists() and not path.exists():
                 (space / _ASIDE).replace(path)
-            shutil.rmtree(space, ignore_errors=True)
+            _remove(space)
             if lock is not None:
                 os.close(lock)
 
@@ -374,6 +374,16 @@ def _move(folder: Path, target: Path) -> None:
 
 def _not_written(path: Path, error: OSError) -> DataError:
     return DataError(f"{path}: cannot be written: {error.strerror or error}")
+
+
+def _remove(folder: Path) -> None:
+    """Remove a folder as far as that is possible: an error that matters is another one."""
+    # after one of a library's threads has failed, others may go on writing for a moment
+    for wait in (0.0, 0.05, 0.2, 0.5):
+        time.sleep(wait)
+        shutil.rmtree(folder, ignore_errors=True)
+        if not folder.exists():
+            return
 
 
 def _missing_parents(place: Path) -> list[Path]:

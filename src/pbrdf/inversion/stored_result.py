@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pbrdf.data.formats.stored import from_stored, to_stored
+from pbrdf.data.origin import Origin, origin_of, remember
 from pbrdf.errors import DataError, ModelError
 from pbrdf.files.atomic import require_whole
 from pbrdf.files.netcdf_files import load_netcdf, write_netcdf_file
@@ -73,11 +74,25 @@ def write_result(result: FitResult, path: Path) -> None:
     arrays.attrs = {
         "title": f"{result.model.name} fitted",
         "fit": json.dumps(_record(result), ensure_ascii=False),
+        "read_from": json.dumps(_read_from(result.dataset), ensure_ascii=False),
     }
     comparison = result.comparison.copy()
     for name in [str(n) for n in comparison.data_vars if comparison[n].dtype == bool]:
         comparison[name] = comparison[name].astype(np.int8).assign_attrs(flag="1 is true")
     write_netcdf_file(path, {"/": arrays, "comparison": comparison, "data": to_stored(result.dataset)})
+
+
+def _read_from(dataset: xr.Dataset) -> dict[str, Any]:
+    """What of the file of the data is shown with a fit."""
+    origin = origin_of(dataset) or Origin(())
+    return {"meanings": origin.meanings, "remarks": origin.remarks, "dropped": origin.dropped}
+
+
+def _origin(read_from: Mapping[str, Any]) -> Origin:
+    meanings = tuple((str(name), str(meaning)) for name, meaning in read_from["meanings"])
+    return Origin(
+        (), {}, meanings, tuple(map(str, read_from["remarks"])), {}, tuple(map(str, read_from["dropped"]))
+    )
 
 
 def load_fit(folder: str | os.PathLike[str]) -> FitResult:
@@ -128,7 +143,9 @@ def read_result(path: Path) -> FitResult:
             raise DataError(
                 f"{path}: the fit is stored in format {record['format']}, this version reads format {FORMAT}: fit again"
             )
-        return _result(record, arrays, comparison, from_stored(dataset, path))
+        measured = from_stored(dataset, path)
+        remember(measured, _origin(json.loads(arrays.attrs["read_from"])))
+        return _result(record, arrays, comparison, measured)
     except ModelError as error:
         raise ModelError(f"{path}: {error}") from error
     except DataError:
