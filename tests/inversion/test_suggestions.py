@@ -175,7 +175,7 @@ def test_a_degree_in_per_cent_is_found():
     result = pbrdf.fit(per_cent, starts=4)
     assert result.verdict().level != Level.DESCRIBES
     found = contradicted_conventions(per_cent, result, {}, until=math.inf)
-    assert found[0].option == "DoLP divided by 100"
+    assert found[0].option == "DoLP divided by 100 in the file"
 
 
 @pytest.mark.slow

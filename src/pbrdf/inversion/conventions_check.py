@@ -162,7 +162,7 @@ def readings(dataset: xr.Dataset) -> Iterator[tuple[str, str, _Change]]:
         found.append((True, "--cosine-weighted", "divided by cos θ_r", _divided_by_cosine))
         found.append((True, "--not-cosine-weighted", "multiplied by cos θ_r", _multiplied_by_cosine))
         if dataset.attrs.get("scale") != "arbitrary":
-            found += _scales(dataset.attrs.get("quantity"))
+            found += _scales(dataset)
     for names in (("theta_r",), ("theta_i",), ("theta_i", "theta_r")):
         if all((dataset[name].values > 0.0).all() for name in names):
             whose = " and ".join(names)
@@ -186,17 +186,21 @@ def _column_options(dataset: xr.Dataset, taken: Mapping[str, str]) -> str:
     return " ".join(f"--column {shlex.quote(f'{name}={columns[source]}')}" for name, source in taken.items())
 
 
-def _unit_options(dataset: xr.Dataset, ratios: Sequence[str]) -> str:
-    """Options by which ratios are per cent; empty where the file has no columns of them."""
+def _unit_options(dataset: xr.Dataset, names: Sequence[str]) -> str:
+    """Options by which variables are per cent; empty where the file has no columns of them."""
     origin = origin_of(dataset)
     columns = origin.columns if origin is not None else {}
-    return " ".join(f"--unit {name}=%" for name in ratios) if all(name in columns for name in ratios) else ""
+    return " ".join(f"--unit {name}=%" for name in names) if all(name in columns for name in names) else ""
 
 
-def _scales(quantity: str | None) -> Iterator[_Reading]:
+def _scales(dataset: xr.Dataset) -> Iterator[_Reading]:
     """Readings of another quantity or unit, where the scale of the values means something."""
+    quantity = dataset.attrs.get("quantity")
     if quantity in ("brdf", "reflectance_factor"):
-        yield True, "values divided by 100 in the file", "taken as per cent", _times(0.01)
+        measured = [name for name in _RADIOMETRIC if name in dataset]
+        # a BRDF has no unit in per cent
+        option = _unit_options(dataset, measured) if quantity == "reflectance_factor" else ""
+        yield True, option or "values divided by 100 in the file", "taken as per cent", _times(0.01)
         yield True, "--quantity radiance", "divided by cos θ_i", _divided_by_source_cosine
     if quantity == "brdf":
         yield True, "--quantity reflectance_factor", "divided by π", _times(1.0 / math.pi)
