@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import tifffile
 from PIL import Image
 
 from pbrdf.errors import DataError
-from pbrdf.instruments.frames.picture_checks import require_checksums, require_possible
+from pbrdf.instruments.frames.picture_checks import require_checksums, require_pages, require_possible
 from pbrdf.instruments.frames.pictures import open_pictures
 
 
@@ -62,3 +63,24 @@ def test_more_pixels_than_the_file_can_hold_are_refused(tmp_path):
         DataError, match=r"a\.tif: declares 100000 × 100000 pixels, 20 GB, which a file of this"
     ):
         require_possible(path, (100_000, 100_000), np.dtype("u2"))
+
+
+@pytest.mark.parametrize("big", [False, True], ids=["classic", "BigTIFF"])
+@pytest.mark.parametrize("order", ["<", ">"])
+def test_pages_of_a_tiff_stand_within_the_file(tmp_path, big, order):
+    path = tmp_path / "a.tif"
+    frames = np.random.default_rng(0).integers(0, 4096, (3, 20, 30)).astype(np.uint16)
+    with tifffile.TiffWriter(path, bigtiff=big, byteorder=order) as file:
+        for frame in frames:
+            file.write(frame)
+    require_pages(path)
+    assert np.array_equal(open_pictures(path).read(2, 0, 20), frames[2])
+
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    with pytest.raises(
+        DataError, match=r"a\.tif: cannot be read as a picture: page \d stands outside of the file"
+    ):
+        open_pictures(path)
+    path.write_bytes(b"MZ" + bytes(30))
+    with pytest.raises(DataError, match="this is not a TIFF file"):
+        open_pictures(path)

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from pbrdf.errors import DataError
-from pbrdf.instruments.frames.picture_checks import require_checksums, require_possible
+from pbrdf.instruments.frames.picture_checks import require_checksums, require_pages, require_possible
 
 __all__ = ["SUFFIXES", "PictureFile", "open_pictures"]
 
@@ -142,6 +142,7 @@ def _decoded(path: Path, page: int) -> np.ndarray:
 def _open_tiff(path: Path) -> PictureFile:
     import tifffile
 
+    require_pages(path)
     with tifffile.TiffFile(path) as file:
         stack = file.series[0]
         first = stack.keyframe
