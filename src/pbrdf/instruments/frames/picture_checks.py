@@ -3,8 +3,8 @@
 PNG (ISO/IEC 15948): after eight bytes of signature come chunks, each its length (4 bytes, the highest first), its name
 (4), its content, and the CRC-32 of name and content (4); the last one is IEND. Decoders skip the checksums of pixels.
 
-TIFF (revision 6.0, and BigTIFF): the header names the byte order and where the first page's directory stands; a directory
-is a number of entries of one size, and where the next one stands, 0 after the last.
+TIFF (revision 6.0, and BigTIFF): the header names the byte order and where the first directory of a page stands; a
+directory is a number of entries of one size, and where the next one stands, 0 after the last.
 """
 
 from __future__ import annotations

@@ -151,17 +151,21 @@ def _open_tiff(path: Path) -> PictureFile:
             raise DataError(f"{path}: a colour picture ({kind.name}); {_ONE_CHANNEL}")
         if kind.name == "MINISWHITE":
             raise DataError(f"{path}: a negative, in which 0 is white; {_ONE_CHANNEL}")
-        if len(file.series) > 1:
+        kinds = {(s.keyframe.imagelength, s.keyframe.imagewidth, s.keyframe.dtype) for s in file.series}
+        if len(kinds) > 1:
             raise DataError(f"{path}: its pages differ in size or type: one file holds pictures of one kind")
-        shape = (*stack.shape[:-2], first.imagelength, first.imagewidth)
+        # pages that were written one by one are a series each
+        pages = [page for one in file.series for page in one.pages]
+        stacked = stack.shape[:-2] if len(file.series) == 1 else (len(pages),)
+        shape = (*stacked, first.imagelength, first.imagewidth)
         dtype = np.dtype(first.dtype).newbyteorder(file.byteorder)
         count = int(np.prod(shape[:-2], dtype=int))
         offset: tuple[int, ...] = ()
-        if stack.dataoffset is not None:
+        if len(file.series) == 1 and stack.dataoffset is not None:
             size = shape[-2] * shape[-1] * dtype.itemsize
             offset = tuple(stack.dataoffset + i * size for i in range(count))
-        elif all(page is not None and page.is_memmappable for page in stack.pages):
-            offset = tuple(page.dataoffsets[0] for page in stack.pages)  # type: ignore[union-attr]
+        elif all(page is not None and page.is_memmappable for page in pages):
+            offset = tuple(page.dataoffsets[0] for page in pages)  # type: ignore[union-attr]
         return PictureFile(path, shape, dtype, offset)
 
 
