@@ -284,16 +284,16 @@ class _Conversion:
                     f"the column {self._name(column)!r} was taken for a degree of polarisation from 0 to 1 and holds "
                     f"{finite.max():g}: if it is in per cent, state unit={{'dolp': '%'}}"
                 )
-                if finite.size >= _MANY and np.median(finite) > _NO_FRACTION:
+                if finite.size >= _MANY and _median(finite) > _NO_FRACTION:
                     raise DataError(f"{self.table.path}: {sentence}, else unit={{'dolp': '1'}}")
                 self.remarks.append(sentence)
         else:
             factor, text = self._radiometric(column)
             finite = values[np.isfinite(values)]
             suspicious = column.unit is None and variable == "I" and self.quantity == "reflectance_factor"
-            if suspicious and finite.size and np.median(finite) > _PER_CENT:
+            if suspicious and finite.size and _median(finite) > _PER_CENT:
                 self.remarks.append(
-                    f"a reflectance factor of {np.median(finite):g} is rather per cent: state unit={{'I': '%'}}, or "
+                    f"a reflectance factor of {_median(finite):g} is rather per cent: state unit={{'I': '%'}}, or "
                     "unit={'I': '1'} if it is right"
                 )
         self.factors[variable] = factor
@@ -407,7 +407,7 @@ class _Conversion:
         if column.variable != "I_std" or column.unit is not None or kind == "variance" or intensity is None:
             return
         both = np.isfinite(values) & np.isfinite(intensity)
-        if both.any() and np.median(values[both]) > np.median(np.abs(intensity[both])):
+        if both.any() and _median(values[both]) > _median(np.abs(intensity[both])):
             name = self._name(column)
             self.remarks.append(
                 f"the uncertainties of the column {name!r} are larger than the values: if they are relative, in per "
@@ -423,6 +423,11 @@ class _Conversion:
             words.append(f"expanded, divided by k = {coverage:g}")
         self.meanings[column.variable] = column.variable + (f" ({'; '.join(words)})" if words else "")
         return values
+
+
+def _median(values: NDArray[np.float64]) -> float:
+    """The middle one, of two the larger: the mean of both may be too large a number."""
+    return float(np.partition(values, values.size // 2)[values.size // 2])
 
 
 def _times(values: NDArray[np.float64], factor: float) -> NDArray[np.float64]:
