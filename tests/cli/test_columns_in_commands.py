@@ -120,7 +120,7 @@ def test_one_missing_uncertainty_leaves_one_value_out(run, scan, tmp_path):
     run("fit", "data.csv", "--starts", 4, "--no-figures", "--no-suggestions")
     record = json.loads((tmp_path / "data-fit" / "fit.json").read_text(encoding="utf-8"))
     summary = " ".join((tmp_path / "data-fit" / "summary.txt").read_text(encoding="utf-8").split())
-    assert "standard uncertainties of the data set; 1 values without one are left out" in summary
+    assert "standard uncertainties of the data set; values without one are left out: 1" in summary
     assert "16 geometries, 15 measured values" in summary
     assert record["uncertainties_from_data"] is True
 

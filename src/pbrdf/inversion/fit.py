@@ -280,7 +280,7 @@ def _noise_in_words(noise: Noise | None, data: Observations) -> str:
         return f"stated: {noise}"
     if data.std_known:
         kind = "standard uncertainties" if data.correlation is None else "covariances"
-        left_out = "" if data.unstated == 0 else f"; {data.unstated} values without one are left out"
+        left_out = "" if data.unstated == 0 else f"; values without one are left out: {data.unstated}"
         return f"{kind} of the data set{left_out}"
     assumed = NoiseModel()
     words = str(assumed)
