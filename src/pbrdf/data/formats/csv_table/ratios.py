@@ -141,7 +141,7 @@ def without_derived(channels: dict[str, NDArray[Any]], std: dict[str, NDArray[An
             }
         expected = dict(ratios)
         whole = ratios or channels
-        if "Q_over_I" in whole and "U_over_I" in whole:
+        if {"dolp", "aolp"} & channels.keys() and "Q_over_I" in whole and "U_over_I" in whole:
             shares = np.column_stack([np.ones(len(whole["Q_over_I"])), whole["Q_over_I"], whole["U_over_I"]])
             expected["dolp"], expected["aolp"] = conventions.dolp_aolp_from_stokes(shares)
     sentences = []
