@@ -53,8 +53,6 @@ def kernel_from_angles(model: Evaluable, theta_i: Any, theta_r: Any, phi: Any, v
     import drjit as dr
 
     theta_i, theta_r, visible = horizon_guard(theta_i, theta_r)
-    turns = 2.0 * math.pi * dr.round(phi * (0.5 / math.pi))
-    phi = dr.select(dr.abs(phi) > _MANY_TURNS, dr.clip(phi - turns, -math.pi, math.pi), phi)
     f = model.kernel(geometry_from_angles(theta_i, theta_r, phi), values, part)
     return [[0.0 if is_zero(x) else dr.select(visible, x, 0.0) for x in row] for row in f]
 
@@ -345,6 +343,8 @@ def _evaluate_drjit(
         if content is not None and not content.any() and not dr.grad_enabled(values[p.name]):
             values[p.name] = None
     theta_i, theta_r, phi = (flatten(angles[name]) for name in ("theta_i", "theta_r", "phi"))
+    turns = 2.0 * math.pi * dr.round(phi * (0.5 / math.pi))
+    phi = dr.select(dr.abs(phi) > _MANY_TURNS, dr.clip(phi - turns, -math.pi, math.pi), phi)
     f = kernel_from_angles(model, theta_i, theta_r, phi, values, part)
     # an opaque mask keeps each output a variable of its own: with constant angles it could be an inner node of
     # the graph, whose derivative Dr.Jit discards

@@ -137,7 +137,8 @@ def read_rows(
         "scale": scale,
     }
     given = {key: value for key, value in options.items() if value is not None}
-    stated = {key: value for key, value in statements(table).items() if key not in comment_units(table)[2]}
+    _, _, of_units = comment_units(table)
+    stated = {key: value for key, value in statements(table).items() if key not in of_units}
     header = Header.parse(path, stated | given)
     if where:
         table = selected(table, where)
