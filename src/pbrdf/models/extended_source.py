@@ -17,7 +17,7 @@ from pbrdf.backend import get_backend
 from pbrdf.models.arrays import is_zero
 from pbrdf.models.base import Model
 from pbrdf.models.evaluation import check_angles, check_incident, horizon_guard
-from pbrdf.optics.geometry import Geometry, dot, geometry_from_angles
+from pbrdf.optics.geometry import Geometry, dot, geometry_from_angles, mirror_facet
 
 __all__ = ["DISC", "disc_rule", "kernel_under_disc", "stokes_under_disc"]
 
@@ -182,10 +182,8 @@ def _turned(geometry: Geometry, along_p: Any, along_s: Any) -> tuple[Geometry, A
     above = moved[2] > 0.0
     scale = dr.rsqrt(dot(moved, moved))
     omega_i = tuple(dr.select(above, m * scale, o) for m, o in zip(moved, geometry.omega_i, strict=True))
-    h = tuple(a + b for a, b in zip(omega_i, geometry.omega_r, strict=True))
-    length2 = dot(h, h)
-    inverse = dr.rsqrt(length2)
-    facet = tuple(c * inverse for c in h)
+    (x, y, z), r = omega_i, geometry.omega_r
+    facet, cos_beta = mirror_facet((x + r[0], y + r[1], z + r[2]))
     sin_i = dr.sqrt(dr.maximum(1.0 - dr.square(omega_i[2]), 1e-12))
-    turned = geometry._replace(omega_i=omega_i, sin_i=sin_i, facet=facet, cos_beta=0.5 * length2 * inverse)
+    turned = geometry._replace(omega_i=omega_i, sin_i=sin_i, facet=facet, cos_beta=cos_beta)
     return turned, above

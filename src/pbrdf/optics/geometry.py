@@ -13,7 +13,15 @@ from typing import Any, NamedTuple
 
 import drjit as dr
 
-__all__ = ["Geometry", "Vector", "cross", "dot", "geometry_from_angles", "geometry_from_sines"]
+__all__ = [
+    "Geometry",
+    "Vector",
+    "cross",
+    "dot",
+    "geometry_from_angles",
+    "geometry_from_sines",
+    "mirror_facet",
+]
 
 Vector = tuple[Any, Any, Any]
 
@@ -73,6 +81,16 @@ class Geometry(NamedTuple):
         return self.omega_r[2]
 
 
+def mirror_facet(h: Vector) -> tuple[Vector, Any]:
+    """Normal of the facet that mirrors ω_i into ω_r, and cosβ on it, from the sum ``h`` of the two unit vectors.
+
+    cosβ = |h|/2: ω_i·facet would cancel between rays that graze from opposite sides.
+    """
+    length2 = dot(h, h)
+    inverse = dr.rsqrt(length2)
+    return (h[0] * inverse, h[1] * inverse, h[2] * inverse), 0.5 * length2 * inverse
+
+
 def geometry_from_angles(theta_i: Any, theta_r: Any, phi: Any) -> Geometry:
     """Build the vectors of a geometry from its angles.
 
@@ -104,9 +122,7 @@ def geometry_from_sines(
     omega_r = (sin_r * cos_phi, sin_r * sin_phi, cos_r)
     if h is None:
         h = (omega_i[0] + omega_r[0], omega_r[1], cos_i + cos_r)
-    length2 = dot(h, h)
-    inverse = dr.rsqrt(length2)
-    facet = (h[0] * inverse, h[1] * inverse, h[2] * inverse)
+    facet, cos_beta = mirror_facet(h)
     return Geometry(
         omega_i=omega_i,
         omega_r=omega_r,
@@ -117,8 +133,6 @@ def geometry_from_sines(
         sin_i=sin_i,
         sin_r=sin_r,
         facet=facet,
-        cos_beta=0.5
-        * length2
-        * inverse,  # ω_i·facet would cancel between rays that graze from opposite sides
+        cos_beta=cos_beta,
         cos_scattering=sin_i * sin_r * cos_phi - cos_i * cos_r,
     )
