@@ -9,9 +9,10 @@ written in C++, with the same roughness (α = √2 σ), index and about the same
 
 Materials take turns in each round, warm, and times are minima over the rounds. Only ratios of one run mean anything.
 ``diffuse`` shows what the scene costs without a material. ``pbrdf`` runs with the accuracy that it takes by itself for
-this paint, ``fast``, and with ``default``.
+this paint, ``fast``, with ``default``, and with the normalization ``visible``.
 
-The script ends with status 1 if ``pbrdf`` takes more than 1.5 times as long as ``pplastic``.
+The script ends with status 1 if ``pbrdf`` takes more than 1.5 times as long as ``pplastic``, or with ``visible`` more
+than 3 times as long as without.
 """
 
 from __future__ import annotations
@@ -34,6 +35,8 @@ import pbrdf.rendering
 from pbrdf.backend import llvm_version, thread_count
 
 TARGET = 1.5
+#: Of ``visible``, against ``pbrdf`` as it is.
+VISIBLE_TARGET = 3.0
 VARIANTS = ("llvm_ad_mono_polarized", "llvm_ad_rgb")
 PAINT = pbrdf.load_paint("matte-white-thick").replace(a=0.45)
 MATERIALS: dict[str, dict[str, Any]] = {
@@ -46,6 +49,7 @@ MATERIALS: dict[str, dict[str, Any]] = {
         "diffuse_reflectance": 0.5,
     },
     "pbrdf": pbrdf.rendering.bsdf_dict(PAINT),
+    "pbrdf, visible": {**pbrdf.rendering.bsdf_dict(PAINT), "normalization": "visible"},
     "pbrdf, default": {**pbrdf.rendering.bsdf_dict(PAINT), "accuracy": "default"},
 }
 
@@ -121,6 +125,9 @@ def measure(variant: str, size: int, spp: int, rounds: int) -> dict[str, Any]:
         "cpu_ratio": {name: cpu[name] / cpu["pplastic"] for name in cpu},
         "target": TARGET,
         "met": ratio["pbrdf"] <= TARGET,
+        "visible_ratio": best["pbrdf, visible"] / best["pbrdf"],
+        "visible_target": VISIBLE_TARGET,
+        "visible_met": best["pbrdf, visible"] <= VISIBLE_TARGET * best["pbrdf"],
     }
 
 
@@ -140,11 +147,14 @@ def show(console: Console, result: dict[str, Any]) -> None:
         ("÷ pplastic", 11),
         ("cpu ÷", 8),
         ("first s", 8),
-        ("aim", 14),
+        ("aim", 23),
     ):
         table.add_column(column, justify="right", no_wrap=True, width=width)
     for name in MATERIALS:
-        aim = f"≤ {TARGET:g}x {'met' if result['met'] else 'missed'}" if name == "pbrdf" else ""
+        aim = {
+            "pbrdf": f"≤ {TARGET:g}x {'met' if result['met'] else 'missed'}",
+            "pbrdf, visible": f"{result['visible_ratio']:.2f} of ≤ {VISIBLE_TARGET:g} × pbrdf",
+        }.get(name, "")
         table.add_row(
             name,
             f"{result['wall_ns_a_sample'][name]:.0f}",
@@ -188,7 +198,7 @@ def main() -> int:
     if options.json is not None:
         report = {"machine": machine, "results": results}
         options.json.write_text(json.dumps(report, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
-    return 0 if all(result["met"] for result in results) else 1
+    return 0 if all(result["met"] and result["visible_met"] for result in results) else 1
 
 
 if __name__ == "__main__":

@@ -8,10 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.integrate import quad
+from scipy.special import beta, betainc
 
 import independent as ref
 from pbrdf.optics.geometry import geometry_from_angles
-from pbrdf.optics.transmission import visible_means
+from pbrdf.optics.transmission import _tail, _tail_coefficients, visible_means
 
 #: θ_i, θ_r, φ in degrees, k
 CASES = [
@@ -101,7 +102,7 @@ def test_solid_angle_of_lit_and_seen_facets(means, unit):
 
 @pytest.mark.parametrize(
     "k",
-    [0.8, 1.0, 1.5, 2.64, 4.0],
+    [0.8, 1.0, 1.5, 2.64, 4.0, 8.0, 20.0],
 )
 def test_normal_incidence_and_view_in_closed_form(means, k):
     """θ_i = θ_r = 0: W = (2μ³)^(k−1), so ∫W dω = 2π 2^(k−1)/(3k − 2); it diverges for k ≤ 2/3."""
@@ -131,9 +132,40 @@ def test_smooth_limit_factor_of_literature_3d(means, k, expected):
     np.testing.assert_allclose(g, expected, atol=0.0101)
 
 
-def test_default_means_agree_with_high(means):
-    """In the range of the paints and of the oracle (0.7 ≤ k ≤ 2.7): 1e-4 in the normaliser at θ ≤ 75°."""
+@pytest.mark.parametrize(
+    ("accuracy", "range_of_k", "tolerance"),
+    [
+        ("default", (0.7, 4.0), 1e-5),
+        ("default", (4.0, 20.0), 3e-5),
+        ("fast", (0.7, 3.0), 2e-4),
+        ("fast", (3.0, 20.0), 4e-4),
+        ("draft", (0.7, 4.0), 5e-3),
+        ("draft", (4.0, 20.0), 2e-2),
+    ],
+)
+@pytest.mark.parametrize("where", ["anywhere", "near the source", "near the plane", "near the normal"])
+def test_means_agree_with_high(means, accuracy, range_of_k, tolerance, where):
+    """Greatest error of the normaliser at θ ≤ 75°, also where the horizon is a step or zeros of W lie side by side."""
     rng = np.random.default_rng(4)
-    angles = np.radians(75) * rng.random(3000), np.radians(75) * rng.random(3000), np.pi * rng.random(3000)
-    k = 0.7 + 2.0 * rng.random(3000)
-    np.testing.assert_allclose(means(*angles, k, "default")[1], means(*angles, k)[1], rtol=1e-4)
+    theta_i, theta_r = np.radians(75) * rng.random((2, 2000))
+    phi = np.pi * rng.random(2000)
+    near = 10.0 ** rng.uniform(-3.0, -1.0, (2, 2000))
+    if where == "near the source":
+        theta_r, phi = np.abs(theta_i - near[0]), np.pi - near[1]
+    elif where == "near the plane":
+        phi = np.where(rng.random(2000) < 0.5, near[0], np.pi - near[0])
+    elif where == "near the normal":
+        theta_i = near[0]
+    k = rng.uniform(*range_of_k, 2000)
+    found, expected = (means(theta_i, theta_r, phi, k, a)[1] for a in (accuracy, "high"))
+    np.testing.assert_allclose(found, expected, rtol=tolerance)
+
+
+@pytest.mark.parametrize("a", [-0.9, -0.5, 0.0, 1.0, 5.0, 28.5])
+def test_polynomial_of_the_incomplete_beta_function(jit, a):
+    """∫ₓ¹ (1 − t²)^a dt with the degree of ``high``, to 1e-8 of the whole."""
+    x = np.linspace(0.0, 1.0, 50)[:-1]
+    y = 1.0 - x * x
+    tail = _tail(jit(1.0 - x), jit(y), jit(a), _tail_coefficients(jit(a), 18)).numpy()
+    whole = beta(0.5, a + 1.0)
+    np.testing.assert_allclose(tail / whole, 0.5 * betainc(a + 1.0, 0.5, y), atol=1e-8)

@@ -38,7 +38,7 @@ def power(base: Any, exponent: Any) -> Any:
     return polynomial(y - (shifted - _ROUNDING), _EXP2) * scale
 
 
-def polynomial(x: Any, coefficients: tuple[float, ...]) -> Any:
+def polynomial(x: Any, coefficients: tuple[Any, ...]) -> Any:
     """Σ c_j x^j by Horner's rule."""
     total: Any = coefficients[-1]
     for c in reversed(coefficients[:-1]):

@@ -12,13 +12,14 @@ Two readings of eq. (13) are kept (docs/model.md, section 3): ``weighted``, D_v 
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import drjit as dr
 
 from pbrdf.optics.diffuse import minnaert_shape
 from pbrdf.optics.fresnel import transmittances
 from pbrdf.optics.geometry import Geometry, dot
+from pbrdf.optics.powers import polynomial
 from pbrdf.optics.quadrature import facet_average, table
 from pbrdf.optics.reference_planes import tilt_rotation
 
@@ -123,28 +124,38 @@ def _transmission_vector(m: Any, mu: Any, p: Any, s: Any, n: Any, kappa: Any | N
     return mean, half * q, half * u
 
 
-def _tanh_sinh(step: float, half: int) -> tuple[list[float], list[float], list[float]]:
-    """Double-exponential rule on (−1, 1): distances of the points from both ends, and weights.
+class _Rule(NamedTuple):
+    """Rule of ``visible_means`` for one accuracy: double-exponential, x = 1/(1 + exp(−u)) with u = rate·sinhτ.
 
-    The distances are given rather than the points, because an integrand with an algebraic end point needs them
-    to full relative precision.
+    Attributes
+    ----------
+    points, weights
+        Equidistant in τ, ascending: u, and du.
+    reach
+        Facets where the logarithm of W has fallen by this much below its largest value are left out.
+    degree
+        Of the polynomial for the integral over λ.
     """
-    from_low, from_high, weights = [], [], []
-    for j in range(-half, half + 1):
-        u = 0.5 * math.pi * math.sinh(j * step)
-        from_low.append(math.exp(u) / math.cosh(u))
-        from_high.append(math.exp(-u) / math.cosh(u))
-        weights.append(step * 0.5 * math.pi * math.cosh(j * step) / math.cosh(u) ** 2)
-    return from_low, from_high, weights
+
+    points: list[float]
+    weights: list[float]
+    reach: float
+    degree: int
+
+
+def _rule(count: int, rate: float, end: float, reach: float, degree: int) -> _Rule:
+    """Rule with ``count`` points from τ = −``end`` to ``end``."""
+    h = 2.0 * end / (count - 1)
+    tau = [h * j - end for j in range(count)]
+    return _Rule([rate * math.sinh(t) for t in tau], [h * rate * math.cosh(t) for t in tau], reach, degree)
 
 
 _VISIBLE_RULES = {
-    "default": _tanh_sinh(0.13, 32),
-    "high": _tanh_sinh(0.06, 70),
-    "draft": _tanh_sinh(0.26, 14),
-    "fast": _tanh_sinh(0.2, 20),
+    "default": _rule(32, 2.0, 2.6, 16.0, 10),
+    "high": _rule(100, 2.5, 3.6, 28.0, 18),
+    "draft": _rule(10, 1.6, 2.1, 10.0, 5),
+    "fast": _rule(16, 1.6, 2.4, 12.0, 7),
 }
-_SERIES_TERMS = {"default": 20, "high": 32, "draft": 10, "fast": 12}
 
 
 def visible_means(geometry: Geometry, k: Any, accuracy: str = "default", scale: Any = 1.0) -> tuple[Any, Any]:
@@ -154,10 +165,12 @@ def visible_means(geometry: Geometry, k: Any, accuracy: str = "default", scale: 
     coordinates about the half vector h, m = (cosλ cosψ, cosλ sinψ, sinλ) along h, q (in the plane of the two
     rays) and h×q: (μ_i' + μ_r') μ_i' μ_r' = cos³λ · 2 cosβ cosψ cos(ψ−β) cos(ψ+β). The λ integral from the
     horizon up is an incomplete beta function; the ψ integral is split where the horizon crosses the plane of
-    the rays and done by the tanh-sinh rule, which takes the algebraic end points.
+    the rays and done by a double-exponential rule. The rule stops well before the algebraic end points: what is left
+    is the sum of a geometric series. For large k the ends are moved to where W vanishes.
     """
     F = type(k)
     UInt = dr.uint32_array_t(F)
+    rule = _VISIBLE_RULES[accuracy]
     difference = tuple(b - a for a, b in zip(geometry.omega_i, geometry.omega_r, strict=True))
     length2 = dot(difference, difference)
     sin_beta = 0.5 * dr.sqrt(length2)
@@ -172,68 +185,98 @@ def visible_means(geometry: Geometry, k: Any, accuracy: str = "default", scale: 
     h_z = geometry.facet[2]
     q_z = difference[2] * dr.rsqrt(dr.maximum(length2, 1e-30))
     s_z2 = dr.maximum(1.0 - h_z * h_z - q_z * q_z, 0.0)
+    p = k - 1.0
     limit = 0.5 * math.pi - beta
+    # −ln of the product above rises from its least value by at least ψ² (1/2 + 1/cos²β)
+    fall = dr.fma(dr.rcp(cos_beta), dr.rcp(cos_beta), 0.5) * (1.0 / rule.reach)
+    end = dr.minimum(limit, dr.rsqrt(dr.maximum(p * fall, 0.01)))
     # g(ψ) = cosψ h_z + sinψ q_z changes sign at the horizon; positive at ψ = 0
-    crossing = dr.clip(-dr.atan2(h_z * dr.select(q_z < 0.0, -1.0, 1.0), dr.abs(q_z)), -limit, limit)
-    from_low, from_high, weights = (table(F, column) for column in _VISIBLE_RULES[accuracy])
-    count = len(_VISIBLE_RULES[accuracy][0])
-    terms = _SERIES_TERMS[accuracy]
-    a = 1.5 * (k - 1.0)
-    half_y = dr.full(F, 0.5, dr.width(k)) if dr.is_jit_v(F) else 0.5
-    whole = 2.0 * (_from_zero(half_y, a, terms) + _to_one(half_y, a, terms))
+    crossing = dr.clip(-dr.atan2(h_z * dr.select(q_z < 0.0, -1.0, 1.0), dr.abs(q_z)), -end, end)
+    points, weights = table(F, rule.points), table(F, rule.weights)
+    last = len(rule.points) - 1
+    # the smaller k, the more lies near the ends; beyond e^−80 single precision has no numbers
+    stretch = dr.clip(dr.rcp(k), 1.0, 80.0 / rule.points[-1])
+    nearest = dr.rcp(1.0 + dr.exp(stretch * rule.points[-1]))
+    step = stretch * rule.weights[-1]
+    tails = _tail_coefficients(1.5 * p, rule.degree)
+    whole = 2.0 * sum(tails)
+    # the segments below and above the crossing: width, distances of their two ends from the edge of the lune next to
+    # them, factors of the last points for what lies beyond
+    margin = limit - end
+    segments: list[tuple[Any, ...]] = []
+    for sign in (1.0, -1.0):
+        width = dr.fma(sign, crossing, end)
+        across = dr.fma(-sign, crossing, limit)
+        ends = (_beyond(width * nearest, step, gap, beta, p) for gap in (margin, across))
+        segments.append((width, across, *ends))
 
     def body(j: Any, total: Any, state: Any) -> tuple[Any, ...]:
-        a, k, whole, beta, cos_beta, scale, limit, crossing, h_z, q_z, s_z2 = state
-        second = j >= count
-        index = dr.select(second, j - count, j)
-        above, below, weight = (column(index) for column in (from_low, from_high, weights))
-        low, high = dr.select(second, crossing, -limit), dr.select(second, limit, crossing)
-        half_width = 0.5 * (high - low)
-        # distances of ψ from −limit and from +limit, without cancellation at the segment's own end there
-        above = dr.fma(half_width, above, dr.select(second, crossing + limit, 0.0))
-        below = dr.fma(half_width, below, dr.select(second, 0.0, limit - crossing))
-        psi = 0.5 * (above - below)
-        sin_psi = dr.sin(psi)
-        cos_psi = dr.sin(dr.minimum(above, below) + beta)
-        # cos(ψ+β) = sin(above) and cos(ψ−β) = sin(below), by whichever distance is the smaller angle
-        cos_plus = dr.sin(dr.minimum(above, below + 2.0 * beta))
-        cos_minus = dr.sin(dr.minimum(below, above + 2.0 * beta))
-        product = cos_psi * cos_plus * cos_minus * 2.0 * cos_beta * scale
-        g = dr.fma(cos_psi, h_z, sin_psi * q_z)
-        y = s_z2 / dr.maximum(dr.fma(g, g, s_z2), 1e-300 if _double(F) else 1e-30)  # 1 − x0²
-        near_end = y <= 0.5
-        upper = dr.select(near_end, _to_one(dr.minimum(y, 0.5), a, terms), 0.0)
-        lower = dr.select(near_end, 0.0, _from_zero(dr.minimum(1.0 - y, 0.5), a, terms))
-        tail = dr.select(near_end, upper, 0.5 * whole - lower)
-        inner = dr.select(g > 0.0, whole - tail, tail)
-        valid = (product > 0.0) & (half_width > 0.0)
-        shape = dr.exp((k - 1.0) * dr.log(dr.select(valid, product, 1.0)))
-        return j + 1, dr.fma(dr.select(valid, weight * half_width, 0.0), shape * inner, total), state
+        p, stretch, tails, whole, sin_beta, cos_beta, scale, margin, h_z, q_z, s_z2, segments = state
+        grown = dr.exp(stretch * points(j))
+        inner = dr.rcp(1.0 + grown)
+        outer = grown * inner
+        weight = stretch * weights(j) * outer * inner
+        for sign, (width, gap, at_outer, at_inner) in zip((1.0, -1.0), segments, strict=True):
+            # distances of ψ from the two edges of the lune
+            here, there = dr.fma(width, outer, margin), dr.fma(width, inner, gap)
+            sin_near, cos_near = dr.sincos(dr.minimum(here, there))
+            cos_psi = dr.fma(sin_near, cos_beta, cos_near * sin_beta)
+            sin_psi = dr.fma(cos_near, cos_beta, -sin_near * sin_beta)  # its magnitude
+            twice = 2.0 * cos_beta * cos_psi  # cos(ψ−β) + cos(ψ+β), of which the smaller is sin_near
+            product = sin_near * (twice - sin_near) * twice * scale
+            g = dr.fma(cos_psi, h_z, dr.select(here < there, -sign, sign) * sin_psi * q_z)
+            inverse = dr.rsqrt(dr.maximum(dr.fma(g, g, s_z2), 1e-30))
+            tail = _tail(1.0 - dr.abs(g) * inverse, s_z2 * inverse * inverse, 1.5 * p, tails)
+            inner_integral = dr.select(g > 0.0, whole - tail, tail)
+            valid = (product > 0.0) & (width > 0.0)
+            shape = dr.exp(p * dr.log(dr.select(valid, product, 1.0)))
+            factor = width * dr.select(j == 0, at_outer, dr.select(j == last, at_inner, 1.0))
+            total = dr.fma(dr.select(valid, weight * factor, 0.0), shape * inner_integral, total)
+        return j + 1, total, state
 
-    state = (a, k, whole, beta, cos_beta, scale, limit, crossing, h_z, q_z, s_z2)
+    state = (p, stretch, tails, whole, sin_beta, cos_beta, scale, margin, h_z, q_z, s_z2, segments)
     integral = dr.while_loop(
-        (UInt(0), dr.zeros(F, 1), state), lambda j, *_: j < 2 * count, body, label="lune", max_iterations=-1
+        (UInt(0), dr.zeros(F, 1), state), lambda j, *_: j <= last, body, label="lune", max_iterations=-1
     )[1]
     return solid_angle, integral
 
 
-def _from_zero(x2: Any, a: Any, terms: int) -> Any:
-    """∫₀ˣ (1 − t²)^a dt = x ₂F₁(½, −a; 3/2; x²) as a series, for x² ≤ ½."""
-    total = 1.0
-    for j in reversed(range(terms)):
-        total = dr.fma((j - a) * ((j + 0.5) / ((j + 1.5) * (j + 1.0))) * x2, total, 1.0)
-    return dr.sqrt(dr.maximum(x2, 1e-30)) * total
+def _beyond(d: Any, step: Any, gap: Any, beta: Any, p: Any) -> Any:
+    """Factor on the outermost point of a segment for the part beyond it, a geometric series.
+
+    The point lies at the distance ``d`` from the segment's end, the next one e^``step`` times as near. There the
+    integrand goes like d^p if the end is the edge of the lune; in general that edge lies at the distance ``gap`` behind
+    the end, and the other zeros of the product β and 2β behind the edge.
+    """
+    slopes = sum(d / dr.maximum(d + gap + far, 1e-30) for far in (0.0, beta, 2.0 * beta))
+    return dr.rcp(1.0 - dr.exp(-step * dr.maximum(dr.fma(p, slopes, 1.0), 0.1)))
 
 
-def _to_one(y: Any, a: Any, terms: int) -> Any:
-    """∫ₓ¹ (1 − t²)^a dt = ½ y^(a+1) Σ (½)_j/j! y^j/(a+1+j) with y = 1 − x² ≤ ½, a > −1."""
-    total = 0.0
-    coefficients = [1.0]
-    for j in range(1, terms):
-        coefficients.append(coefficients[-1] * (j - 0.5) / j)
-    for j in reversed(range(terms)):
-        total = dr.fma(y, total, coefficients[j] * dr.rcp(a + (1.0 + j)))
-    return 0.5 * dr.exp((a + 1.0) * dr.log(dr.maximum(y, 1e-30))) * total
+def _tail_coefficients(a: Any, degree: int) -> tuple[Any, ...]:
+    """Coefficients in w = 1 − x of T = (1 − x²)^−(a+1) ∫ₓ¹ (1 − t²)^a dt on 0 ≤ x ≤ 1, a > −1.
+
+    Lanczos' τ method: w(1 − w/2) T' + (a+1)(1 − w) T = 1/2 but for a multiple of a Chebyshev polynomial that lets the
+    power series end.
+    """
+    chebyshev = _shifted_chebyshev(degree + 1)
+    series, response = [0.5 * dr.rcp(a + 1.0)], [chebyshev[0] * dr.rcp(a + 1.0)]
+    for j in range(1, degree + 1):
+        inverse, factor = dr.rcp(a + (1.0 + j)), a + 0.5 * (j + 1)
+        series.append(series[-1] * factor * inverse)
+        response.append(dr.fma(response[-1], factor, chebyshev[j]) * inverse)
+    factor = a + (1.0 + 0.5 * degree)
+    tau = -series[-1] * factor / dr.fma(response[-1], factor, chebyshev[-1])
+    return tuple(dr.fma(tau, r, s) for s, r in zip(series, response, strict=True))
+
+
+def _shifted_chebyshev(n: int) -> list[float]:
+    """Coefficients of cos(n arccos(2w − 1)) as a polynomial in w."""
+    return [(-1.0) ** (n + j) * 4.0**j * n / (n + j) * math.comb(n + j, 2 * j) for j in range(n + 1)]
+
+
+def _tail(w: Any, y: Any, a: Any, coefficients: tuple[Any, ...]) -> Any:
+    """∫ₓ¹ (1 − t²)^a dt with w = 1 − x, y = 1 − x²."""
+    return dr.exp((a + 1.0) * dr.log(dr.maximum(y, 1e-30))) * polynomial(w, coefficients)
 
 
 def _inverse(weight: Any) -> Any:
