@@ -126,3 +126,34 @@ def test_a_disk_that_is_full_leaves_the_old_file_and_a_line(tmp_path, what):
     assert [path.name for path in tmp_path.iterdir()] == [what]
     if what.startswith("data"):
         assert pbrdf.read(tmp_path / what).sizes["geometry"] == 4
+
+
+def test_a_file_holds_what_xarray_would_have_written(tmp_path):
+    several = xr.Dataset(
+        {
+            "a": (
+                ("x", "y"),
+                np.arange(6.0).reshape(2, 3),
+                {"units": "1/sr", "range": [0.0, 5.0], "count": 3},
+            ),
+            "flag": ("x", np.array([True, False])),
+            "word": ("y", np.array(["p", "ö", ""])),
+            "number": ((), np.int8(4)),
+            "y_of": ("x", [1, 2]),
+        },
+        {"x": ["p", "ö"], "place": ("x", [0.5, np.nan])},
+        {"title": "one", "both": [1, 2], "one": 1.5},
+    )
+    several["empty"] = ("nothing", np.zeros(0))
+    write_netcdf_file(tmp_path / "ours.nc", {"/": several, "data": several[["a"]]})
+    several.to_netcdf(tmp_path / "theirs.nc", engine="h5netcdf")
+    with xr.open_dataset(tmp_path / "theirs.nc") as theirs, xr.open_dataset(tmp_path / "ours.nc") as ours:
+        assert ours.load().identical(theirs.load())
+        assert {name: v.dtype for name, v in ours.variables.items()} == {
+            name: v.dtype for name, v in theirs.variables.items()
+        }
+    with h5py.File(tmp_path / "ours.nc") as file:
+        scales = [x for group in (file, file["data"]) for x in group.values() if "_Netcdf4Dimid" in x.attrs]
+        numbers = [int(x.attrs["_Netcdf4Dimid"]) for x in scales]
+        assert len(numbers) == 5 == len(set(numbers)), "every dimension of the file has a number of its own"
+        assert file["a"].dims[1][0].attrs["NAME"].startswith(b"This is a netCDF dimension but not a netCDF")
