@@ -1,4 +1,4 @@
-"""Sums and their derivatives in one loop: against closed forms, forwards, in reverse, nested and inside another loop."""
+"""Sums and their derivatives in one loop: against closed forms, forwards, in reverse, nested, inside another loop."""
 
 from __future__ import annotations
 
