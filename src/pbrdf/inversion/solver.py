@@ -403,7 +403,9 @@ def _iterate(
 ) -> _State:
     """One step of every lane."""
     trial, predicted = _propose(state)
-    return _judge(state, trial, predicted, _normal_equations(residuals, trial, lane), tolerance, limit)
+    going = _arrived(state, trial, predicted, tolerance) == int(Status.RUNNING)
+    evaluated = _normal_equations(residuals, trial, lane, going)
+    return _judge(state, trial, predicted, evaluated, tolerance, limit)
 
 
 def _wide_iteration(residuals: Residuals, state: _State, lane: Any, tolerance: Any, limit: Any) -> _State:
@@ -411,8 +413,10 @@ def _wide_iteration(residuals: Residuals, state: _State, lane: Any, tolerance: A
     import drjit as dr
 
     trial, predicted = _propose(state)
-    dr.eval(trial, predicted)
-    state = _judge(state, trial, predicted, _wide_normal_equations(residuals, trial, lane), tolerance, limit)
+    going = _arrived(state, trial, predicted, tolerance) == int(Status.RUNNING)
+    dr.eval(trial, predicted, going)
+    evaluated = _wide_normal_equations(residuals, trial, lane, going)
+    state = _judge(state, trial, predicted, evaluated, tolerance, limit)
     dr.eval(state)
     return state
 
@@ -434,6 +438,30 @@ def _propose(state: _State) -> tuple[list[Any], Any]:
     return trial, predicted
 
 
+def _arrived(state: _State, trial: list[Any], predicted: Any, tolerance: Any) -> Any:
+    """Why a lane need not go where it would go next, as it stands at a minimum; RUNNING where it does."""
+    import drjit as dr
+
+    u, g, size, low, high = state.u, state.g, len(state.u), state.low, state.high
+    A = _unpack(state.A, size)
+    Float, U = type(predicted), type(state.status)
+    length = dr.zeros(Float, 1)
+    slope2 = dr.zeros(Float, 1)  # largest squared cosine between the residuals and a column of J
+    leaving = _leaving(g, u, low, high)
+    for i in range(size):
+        length = dr.maximum(length, dr.abs(trial[i] - u[i]) / dr.maximum(high[i] - low[i], 1e-300))
+        cosine2 = g[i] * g[i] / dr.maximum(2.0 * A[i][i] * state.cost, 1e-300)
+        slope2 = dr.maximum(slope2, dr.select(leaving[i], 0.0, cosine2))
+    # a step is small because the minimum is near only if damping has not made it so
+    free = state.damping <= 1.0
+    # below some 1e-15 of the cost a reduction cannot be told from rounding
+    small = (predicted >= 0.0) & (predicted <= dr.maximum(tolerance * tolerance, 4e-15) * state.cost)
+    status = dr.select(free & small, U(int(Status.SMALL_REDUCTION)), U(int(Status.RUNNING)))
+    status = dr.select(free & (length < tolerance), U(int(Status.SMALL_STEP)), status)
+    status = dr.select(slope2 <= tolerance * tolerance, U(int(Status.ZERO_GRADIENT)), status)
+    return dr.select(dr.isfinite(state.cost), status, U(int(Status.RUNNING)))
+
+
 def _judge(
     state: _State,
     trial: list[Any],
@@ -442,16 +470,15 @@ def _judge(
     tolerance: Any,
     limit: Any,
 ) -> _State:
-    """Accept or reject what every lane tried, and see whether it is done."""
+    """See which lanes had arrived, and accept or reject what the others tried."""
     import drjit as dr
 
-    u, g, size, low, high = state.u, state.g, len(state.u), state.low, state.high
-    A = _unpack(state.A, size)
-    delta = [trial[i] - u[i] for i in range(size)]
+    arrived = _arrived(state, trial, predicted, tolerance)
+    going = arrived == int(Status.RUNNING)
     cost, packed, gradient = evaluated
     first = ~dr.isfinite(state.cost)
     finite = dr.isfinite(cost)
-    accepted = finite & (((cost < state.cost) & (predicted > 0.0)) | first)
+    accepted = going & finite & (((cost < state.cost) & (predicted > 0.0)) | first)
     gain = dr.select(first, 1.0, (state.cost - cost) / dr.maximum(predicted, 1e-300))
     factor = dr.clip(1.0 - (2.0 * gain - 1.0) ** 3, 1.0 / 5.0, 2.0)
     damping = dr.select(
@@ -461,28 +488,15 @@ def _judge(
     )
     growth = dr.select(accepted, 2.0, dr.minimum(2.0 * state.growth, 64.0))
 
-    # a step is small because the minimum is near only if damping has not made it so
-    length = dr.zeros(type(cost), 1)
-    leaving = _leaving(g, u, low, high)
-    slope2 = dr.zeros(type(cost), 1)  # largest squared cosine between the residuals and a column of J
-    length_of_box = dr.zeros(type(cost), 1)
-    for i in range(size):
-        length_of_box = dr.maximum(length_of_box, high[i] - low[i])
-        length = dr.maximum(length, dr.abs(delta[i]) / dr.maximum(high[i] - low[i], 1e-300))
-        cosine2 = g[i] * g[i] / dr.maximum(2.0 * A[i][i] * state.cost, 1e-300)
-        slope2 = dr.maximum(slope2, dr.select(leaving[i], 0.0, cosine2))
-    free = state.damping <= 1.0
     U = type(state.status)
     slow = dr.select(state.cost - cost > CREEPING * state.cost, U(0), state.slow + 1)
     status = dr.select((state.damping > 1e12) | (slow >= PATIENCE), U(int(Status.STALLED)), U(0))
-    # below some 1e-15 of the cost a reduction cannot be told from rounding
-    small = (predicted >= 0.0) & (predicted <= dr.maximum(tolerance * tolerance, 4e-15) * state.cost)
-    status = dr.select(free & small, U(int(Status.SMALL_REDUCTION)), status)
-    status = dr.select(free & (length < tolerance), U(int(Status.SMALL_STEP)), status)
-    status = dr.select(slope2 <= tolerance * tolerance, U(int(Status.ZERO_GRADIENT)), status)
+    status = dr.select(going, status, arrived)
     status = dr.select((status == 0) & (state.iterations >= limit), U(int(Status.ITERATIONS)), status)
     # where every unknown is held there is nothing to try
-    held = length_of_box <= 0.0
+    held = state.high[0] <= state.low[0]
+    for low, high in zip(state.low[1:], state.high[1:], strict=True):
+        held = held & (high <= low)
     begun = dr.select(held, U(int(Status.ZERO_GRADIENT)), U(int(Status.RUNNING)))
     status = dr.select(first, dr.select(finite, begun, U(int(Status.NOT_FINITE))), status)
 
@@ -490,21 +504,23 @@ def _judge(
         return [dr.select(accepted, a, b) for a, b in zip(new, old, strict=True)]
 
     return _State(
-        u=keep(trial, u),
-        low=low,
-        high=high,
+        u=keep(trial, state.u),
+        low=state.low,
+        high=state.high,
         cost=dr.select(accepted, cost, state.cost),
         A=keep(packed, state.A),
-        g=keep(gradient, g),
+        g=keep(gradient, state.g),
         damping=damping,
         growth=growth,
         status=status,
-        iterations=state.iterations + 1,
+        iterations=dr.select(going, state.iterations + 1, state.iterations),
         slow=dr.select(first, U(0), slow),
     )
 
 
-def _wide_normal_equations(residuals: Residuals, u: list[Any], lane: Any) -> tuple[Any, list[Any], list[Any]]:
+def _wide_normal_equations(
+    residuals: Residuals, u: list[Any], lane: Any, going: Any
+) -> tuple[Any, list[Any], list[Any]]:
     """What :func:`_normal_equations` gives, the points of each lane shared out, a slice of them in a launch."""
     import drjit as dr
 
@@ -518,10 +534,11 @@ def _wide_normal_equations(residuals: Residuals, u: list[Any], lane: Any) -> tup
     owner = number // places
     offset = number - owner * places
     shared_u, shared_lane = [dr.gather(Float, v, owner) for v in u], dr.gather(UInt32, lane, owner)
-    dr.eval(offset, shared_u, shared_lane)
+    wanted = dr.gather(type(going), going, owner)
+    dr.eval(offset, shared_u, shared_lane, wanted)
     total: list[Any] | None = None
     for begin in range(0, points, slice_):
-        end = dr.opaque(UInt32, min(begin + slice_, points))
+        end = dr.select(wanted, dr.opaque(UInt32, min(begin + slice_, points)), 0)
         cost, A, g = _sums(
             residuals, shared_u, shared_lane, offset + dr.opaque(UInt32, begin), places, end, order
         )
@@ -535,13 +552,16 @@ def _wide_normal_equations(residuals: Residuals, u: list[Any], lane: Any) -> tup
     return _with_penalty(residuals, u, total[0], total[1:-size], total[-size:])
 
 
-def _normal_equations(residuals: Residuals, u: list[Any], lane: Any) -> tuple[Any, list[Any], list[Any]]:
-    """½ Σ r², the lower triangle of JᵀJ by rows, and Jᵀr, in a symbolic loop over the points."""
+def _normal_equations(
+    residuals: Residuals, u: list[Any], lane: Any, going: Any
+) -> tuple[Any, list[Any], list[Any]]:
+    """½ Σ r², the lower triangle of JᵀJ by rows, and Jᵀr, in a symbolic loop over the points, of lanes that go on."""
     import drjit as dr
 
     UInt32 = type(lane)
     one = dr.opaque(UInt32, 1)
-    cost, A, g = _sums(residuals, u, lane, UInt32(0), one, dr.opaque(UInt32, residuals.points), None)
+    end = dr.select(going, dr.opaque(UInt32, residuals.points), 0)
+    cost, A, g = _sums(residuals, u, lane, UInt32(0), one, end, None)
     return _with_penalty(residuals, u, cost, A, g)
 
 

@@ -18,7 +18,7 @@ from pbrdf.optics.half_difference import facet_tilt
 __all__ = ["Part", "draw", "thinned"]
 
 #: Geometries that are enough to search, at least, and for each unknown.
-ENOUGH, FOR_EACH_UNKNOWN = 1000, 40
+ENOUGH, FOR_EACH_UNKNOWN = 250, 40
 #: Data of fewer than so many times as many geometries are searched as they are.
 WORTH_IT = 3
 #: Edges of the strata, degrees.

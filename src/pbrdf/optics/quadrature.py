@@ -26,6 +26,7 @@ from typing import Any, NamedTuple
 import drjit as dr
 
 from pbrdf.optics.geometry import Geometry
+from pbrdf.optics.summation import differentiated, summed
 from pbrdf.optics.transport import transported_rows
 
 __all__ = ["ACCURACIES", "CLEAR_WEDGE", "facet_average", "needs_wedge", "table", "wedge_distance"]
@@ -99,6 +100,14 @@ def wedge_distance(cos_theta: Any, sin_theta: Any, sigma: Any) -> Any:
     return cos_theta / dr.maximum(sigma * sin_theta, cos_theta / _FAR)
 
 
+def _edges(geometry: Geometry, sigma: Any) -> tuple[Any, Any]:
+    """Distances of the edges of the lit and of the seen half-plane."""
+    return (
+        wedge_distance(geometry.cos_i, geometry.sin_i, sigma),
+        wedge_distance(geometry.cos_r, geometry.sin_r, sigma),
+    )
+
+
 def needs_wedge(c_i: Any, c_r: Any, sigma: Any) -> Any:
     """Tell where the default accuracy takes the mapped wedge instead of a small cubature."""
     return (dr.minimum(c_i, c_r) <= CLEAR_WEDGE) | (sigma > SIGMA_25)
@@ -124,8 +133,7 @@ def facet_average(
     geometry, sigma
         Geometry and slope standard deviation.
     args
-        Differentiable values that the integrand needs. They are handed over as loop state rather than
-        captured, because derivatives pass into a symbolic loop only through its state.
+        Differentiable values that the integrand needs: what it captures counts as constant.
     accuracy
         One of ``ACCURACIES``.
 
@@ -136,12 +144,10 @@ def facet_average(
     """
     F = type(sigma)
     UInt = dr.uint32_array_t(F)
-    c_i = wedge_distance(geometry.cos_i, geometry.sin_i, sigma)
-    c_r = wedge_distance(geometry.cos_r, geometry.sin_r, sigma)
-    zeros = [dr.zeros(F, 1) for _ in range(size)]
-    vectors = tuple(geometry)  # as loop state a plain tuple, see Geometry
+    c_i, c_r = _edges(geometry, sigma)
+    vectors = tuple(geometry)
 
-    def add(total: Any, m: Any, weight: Any, vectors: Any, args: Any, check: bool) -> list[Any]:
+    def weighted(m: Any, weight: Any, vectors: Any, args: Any, check: bool) -> list[Any]:
         geometry = Geometry(*vectors)
         mu_i = dr.fma(m[0], geometry.omega_i[0], m[2] * geometry.omega_i[2])
         mu_r = dr.fma(
@@ -151,8 +157,7 @@ def facet_average(
             valid = (mu_i > 0.0) & (mu_r > 0.0)
             mu_i, mu_r = dr.select(valid, mu_i, 1.0), dr.select(valid, mu_r, 1.0)
             weight = dr.select(valid, weight, 0.0)
-        values = integrand(m, mu_i, mu_r, geometry, args)
-        return [dr.fma(weight, value, t) for value, t in zip(values, total, strict=True)]
+        return [weight * value for value in integrand(m, mu_i, mu_r, geometry, args)]
 
     rule = ACCURACIES[accuracy]
     if rule is None:
@@ -168,63 +173,44 @@ def facet_average(
     count = dr.select(wedge_lanes, UInt(0), dr.select(narrow, UInt(3), UInt(7)))
     nodes = [table(F, column) for column in _RULES]
 
-    def clear_body(j: Any, total: Any, sigma: Any, vectors: Any, args: Any) -> tuple[Any, ...]:
+    def quarter_turns(j: Any, sigma: Any, vectors: Any, args: Any) -> list[Any]:
         x, y, weight = (node(offset + j, j < count) for node in nodes)
         mx, my = x * sigma, y * sigma
         inverse = dr.rsqrt(dr.fma(mx, mx, dr.fma(my, my, 1.0)))
         mx, my = mx * inverse, my * inverse
-        for m_x, m_y in ((mx, my), (-my, mx), (-mx, -my), (my, -mx)):
-            total = add(total, (m_x, m_y, inverse), weight, vectors, args, False)
-        return j + 1, total, sigma, vectors, args
+        turned = [
+            weighted((m_x, m_y, inverse), weight, vectors, args, False)
+            for m_x, m_y in ((mx, my), (-my, mx), (-mx, -my), (my, -mx))
+        ]
+        return [a + b + c + d for a, b, c, d in zip(*turned, strict=True)]
 
-    clear = dr.while_loop(
-        (UInt(0), zeros, sigma, vectors, args),
-        lambda j, *_: j < count,
-        clear_body,
-        label="facets",
-        max_iterations=-1,
-    )[1]
-    axes = _wedge_axes(geometry, c_i, c_r)
+    clear = summed(quarter_turns, count, size, (sigma, vectors, args), label="facets")
 
-    def row_body(row: Any, total: Any, sigma: Any, vectors: Any, axes: Any, args: Any) -> tuple[Any, ...]:
-        f, e, w_max, lower, upper = axes
-        w, dw = _squeeze_below((F(row) - half) * step, w_max, steepness, flatness)
+    def row(j: Any, sigma: Any, vectors: Any, args: Any) -> list[Any]:
+        # the axes are found anew in each row: their derivatives are then those by what they depend on
+        f, e, w_max, lower, upper = _wedge_axes(Geometry(*vectors), sigma)
+        w, dw = _squeeze_below((F(j) - half) * step, w_max, steepness, flatness)
         low = dr.clip(dr.fma(lower[1], w, lower[0]), -_FAR, _FAR)
         high = dr.maximum(dr.minimum(dr.fma(upper[1], w, upper[0]), _FAR), low)
         # (1 − exp(low − high)): with it the derivative of the map has no cancellation in a narrow interval
         narrowness = 1.0 - dr.exp(steepness * (low - high))
         row_weight = (step * step * (0.5 / math.pi)) * dr.exp(-0.5 * w * w) * dw * narrowness
 
-        def column_body(
-            column: Any, total: Any, sigma: Any, vectors: Any, args: Any, axes: Any, limits: Any
-        ) -> tuple[Any, ...]:
+        def column(j: Any, sigma: Any, vectors: Any, args: Any, axes: Any, limits: Any) -> list[Any]:
             f, e = axes
             w, low, high, row_weight = limits
-            v, dv = _squeeze_between((F(column) - half) * step, low, high, steepness, flatness)
+            v, dv = _squeeze_between((F(j) - half) * step, low, high, steepness, flatness)
             weight = row_weight * dv * dr.exp(-0.5 * v * v)
             x, y = sigma * dr.fma(f[0], w, e[0] * v), sigma * dr.fma(f[1], w, e[1] * v)
             inverse = dr.rsqrt(dr.fma(x, x, dr.fma(y, y, 1.0)))
-            total = add(total, (x * inverse, y * inverse, inverse), weight, vectors, args, True)
-            return column + 1, total, sigma, vectors, args, axes, limits
+            return weighted((x * inverse, y * inverse, inverse), weight, vectors, args, True)
 
-        columns = dr.while_loop(
-            (UInt(0), list(zeros), sigma, vectors, args, (f, e), (w, low, high, row_weight)),
-            lambda column, *_: column < axis_nodes,
-            column_body,
-            label="wedge columns",
-            max_iterations=-1,
-        )[1]
-        total = [a + b for a, b in zip(total, columns, strict=True)]
-        return row + 1, total, sigma, vectors, axes, args
+        by = differentiated((sigma, vectors, args))
+        state = (sigma, vectors, args, (f, e), (w, low, high, row_weight))
+        return summed(column, axis_nodes, size, state, by, label="wedge columns")
 
-    wedge = dr.while_loop(
-        (UInt(0), list(zeros), sigma, vectors, axes, args),
-        lambda row, *_: wedge_lanes & (row < axis_nodes),
-        row_body,
-        label="wedge rows",
-        max_iterations=-1,
-    )[1]
-    # every loop sums up from 0: only then can Dr.Jit differentiate it in reverse without storing its states
+    rows = dr.select(wedge_lanes, axis_nodes, 0)
+    wedge = summed(row, rows, size, (sigma, vectors, args), label="wedge rows")
     return [a + b for a, b in zip(clear, wedge, strict=True)]
 
 
@@ -298,8 +284,9 @@ def _nearer_edge_axes(geometry: Geometry, c_i: Any, c_r: Any) -> tuple[Any, ...]
     return (f, e), dr.minimum(c_i, c_r), dr.maximum(c_i, c_r), -cos_phi, dr.abs(sin_phi)
 
 
-def _wedge_axes(geometry: Geometry, c_i: Any, c_r: Any) -> tuple[Any, ...]:
+def _wedge_axes(geometry: Geometry, sigma: Any) -> tuple[Any, ...]:
     """Outer axis f, inner axis e, outer limit and the inner limits (constant, slope in the outer variable)."""
+    c_i, c_r = _edges(geometry, sigma)
     cos_phi, sin_phi = -geometry.s_r[1], geometry.s_r[0]
     cos_d = -cos_phi  # a_i·a_r
     same_side = cos_d >= 0.0
