@@ -229,7 +229,7 @@ def solve(
         if progress is not None:
             progress(max(batch - len(lanes), 0), batch)
     solution = result.solution()
-    solution.status[_nothing_to_gain(solution, lower, upper)] = Status.SMALL_REDUCTION
+    solution.status[nothing_to_gain(solution, lower, upper)] = Status.SMALL_REDUCTION
     return solution
 
 
@@ -449,6 +449,40 @@ def _judge(
     A = _unpack(state.A, size)
     delta = [trial[i] - u[i] for i in range(size)]
     cost, packed, gradient = evaluated
+    length = dr.zeros(type(cost), 1)
+    leaving = _leaving(g, u, low, high)
+    slope2 = dr.zeros(type(cost), 1)
+    length_of_box = dr.zeros(type(cost), 1)
+    for i in range(size):
+        length_of_box = dr.maximum(length_of_box, high[i] - low[i])
+        length = dr.maximum(length, dr.abs(delta[i]) / dr.maximum(high[i] - low[i], 1e-300))
+        cosine2 = g[i] * g[i] / dr.maximum(2.0 * A[i][i] * state.cost, 1e-300)
+        slope2 = dr.maximum(slope2, dr.select(leaving[i], 0.0, cosine2))
+    accepted, walk = verdict(state, cost, predicted, length, slope2, length_of_box, tolerance, limit)
+
+    def keep(new: list[Any], old: list[Any]) -> list[Any]:
+        return [dr.select(accepted, a, b) for a, b in zip(new, old, strict=True)]
+
+    return _State(u=keep(trial, u), low=low, high=high, A=keep(packed, state.A), g=keep(gradient, g), **walk)
+
+
+def verdict(
+    state: _State,
+    cost: Any,
+    predicted: Any,
+    length: Any,
+    slope2: Any,
+    length_of_box: Any,
+    tolerance: Any,
+    limit: Any,
+) -> tuple[Any, dict[str, Any]]:
+    """Which lanes accept what they tried, and what becomes of all of a state but unknowns and normal equations.
+
+    ``length`` is the longest of the steps tried, in units of the range of each unknown, ``slope2`` the largest squared
+    cosine between the residuals and the column of J of an unknown that is not held, before the step.
+    """
+    import drjit as dr
+
     first = ~dr.isfinite(state.cost)
     finite = dr.isfinite(cost)
     accepted = finite & (((cost < state.cost) & (predicted > 0.0)) | first)
@@ -462,15 +496,6 @@ def _judge(
     growth = dr.select(accepted, 2.0, dr.minimum(2.0 * state.growth, 64.0))
 
     # a step is small because the minimum is near only if damping has not made it so
-    length = dr.zeros(type(cost), 1)
-    leaving = _leaving(g, u, low, high)
-    slope2 = dr.zeros(type(cost), 1)  # largest squared cosine between the residuals and a column of J
-    length_of_box = dr.zeros(type(cost), 1)
-    for i in range(size):
-        length_of_box = dr.maximum(length_of_box, high[i] - low[i])
-        length = dr.maximum(length, dr.abs(delta[i]) / dr.maximum(high[i] - low[i], 1e-300))
-        cosine2 = g[i] * g[i] / dr.maximum(2.0 * A[i][i] * state.cost, 1e-300)
-        slope2 = dr.maximum(slope2, dr.select(leaving[i], 0.0, cosine2))
     free = state.damping <= 1.0
     U = type(state.status)
     slow = dr.select(state.cost - cost > CREEPING * state.cost, U(0), state.slow + 1)
@@ -485,23 +510,15 @@ def _judge(
     held = length_of_box <= 0.0
     begun = dr.select(held, U(int(Status.ZERO_GRADIENT)), U(int(Status.RUNNING)))
     status = dr.select(first, dr.select(finite, begun, U(int(Status.NOT_FINITE))), status)
-
-    def keep(new: list[Any], old: list[Any]) -> list[Any]:
-        return [dr.select(accepted, a, b) for a, b in zip(new, old, strict=True)]
-
-    return _State(
-        u=keep(trial, u),
-        low=low,
-        high=high,
-        cost=dr.select(accepted, cost, state.cost),
-        A=keep(packed, state.A),
-        g=keep(gradient, g),
-        damping=damping,
-        growth=growth,
-        status=status,
-        iterations=state.iterations + 1,
-        slow=dr.select(first, U(0), slow),
-    )
+    walk = {
+        "cost": dr.select(accepted, cost, state.cost),
+        "damping": damping,
+        "growth": growth,
+        "status": status,
+        "iterations": state.iterations + 1,
+        "slow": dr.select(first, U(0), slow),
+    }
+    return accepted, walk
 
 
 def _wide_normal_equations(residuals: Residuals, u: list[Any], lane: Any) -> tuple[Any, list[Any], list[Any]]:
@@ -522,7 +539,7 @@ def _wide_normal_equations(residuals: Residuals, u: list[Any], lane: Any) -> tup
     total: list[Any] | None = None
     for begin in range(0, points, slice_):
         end = dr.opaque(UInt32, min(begin + slice_, points))
-        cost, A, g = _sums(
+        cost, A, g = point_sums(
             residuals, shared_u, shared_lane, offset + dr.opaque(UInt32, begin), places, end, order
         )
         dr.eval(cost, A, g)
@@ -541,7 +558,7 @@ def _normal_equations(residuals: Residuals, u: list[Any], lane: Any) -> tuple[An
 
     UInt32 = type(lane)
     one = dr.opaque(UInt32, 1)
-    cost, A, g = _sums(residuals, u, lane, UInt32(0), one, dr.opaque(UInt32, residuals.points), None)
+    cost, A, g = point_sums(residuals, u, lane, UInt32(0), one, dr.opaque(UInt32, residuals.points), None)
     return _with_penalty(residuals, u, cost, A, g)
 
 
@@ -558,7 +575,7 @@ def _with_penalty(
     return cost, A, g
 
 
-def _sums(
+def point_sums(
     residuals: Residuals, u: list[Any], lane: Any, first: Any, stride: Any, end: Any, order: Any | None
 ) -> tuple[Any, list[Any], list[Any]]:
     """½ Σ r², the lower triangle of JᵀJ by rows, and Jᵀr over the points first, first + stride, … before end."""
@@ -702,7 +719,7 @@ def _damped_step(
     return [dr.select(held[i], known[i], x[i] * scale[i]) for i in range(size)]
 
 
-def _nothing_to_gain(solution: Solution, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
+def nothing_to_gain(solution: Solution, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
     """Numbers of the lanes that stopped short though no step, however long, promises more than nothing."""
     found = []
     for lane in np.flatnonzero(np.isin(solution.status, (Status.STALLED, Status.ITERATIONS))):
