@@ -585,7 +585,7 @@ def point_sums(
     Float = type(u[0])
     triangle = [(i, j) for i in range(size) for j in range(i + 1)]
 
-    def body(place: Any, u: list[Any], lane: Any, cost: Any, A: list[Any], g: list[Any]) -> tuple[Any, ...]:
+    def body(place: Any, cost: Any, A: list[Any], g: list[Any]) -> tuple[Any, ...]:
         point = place if order is None else dr.gather(type(lane), order, place)
         r, J = _jacobian(residuals.function, u, lane, point)
         if residuals.loss == "linear":
@@ -598,19 +598,19 @@ def point_sums(
             weighted = [[x * slope for x, (_, slope) in zip(column, losses, strict=True)] for column in J]
         A = [a + _inner(weighted[i], J[j]) for a, (i, j) in zip(A, triangle, strict=True)]
         g = [b + _inner(weighted[i], r) for i, b in enumerate(g)]
-        return place + stride, u, lane, cost, A, g
+        return place + stride, cost, A, g
 
     zero = Float(0.0)
     with dr.suspend_grad():
         u = [dr.detach(v) for v in u]
     out = dr.while_loop(
-        (first, u, lane, zero, [zero] * len(triangle), [zero] * size),
+        (first, zero, [zero] * len(triangle), [zero] * size),
         lambda place, *_: place < end,
         body,
         mode="symbolic",
         label="points",
     )
-    return out[3], list(out[4]), list(out[5])
+    return out[1], list(out[2]), list(out[3])
 
 
 def _jacobian(function: Function, u: list[Any], lane: Any, point: Any) -> tuple[list[Any], list[list[Any]]]:
