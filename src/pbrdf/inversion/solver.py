@@ -449,40 +449,6 @@ def _judge(
     A = _unpack(state.A, size)
     delta = [trial[i] - u[i] for i in range(size)]
     cost, packed, gradient = evaluated
-    length = dr.zeros(type(cost), 1)
-    leaving = _leaving(g, u, low, high)
-    slope2 = dr.zeros(type(cost), 1)
-    length_of_box = dr.zeros(type(cost), 1)
-    for i in range(size):
-        length_of_box = dr.maximum(length_of_box, high[i] - low[i])
-        length = dr.maximum(length, dr.abs(delta[i]) / dr.maximum(high[i] - low[i], 1e-300))
-        cosine2 = g[i] * g[i] / dr.maximum(2.0 * A[i][i] * state.cost, 1e-300)
-        slope2 = dr.maximum(slope2, dr.select(leaving[i], 0.0, cosine2))
-    accepted, walk = verdict(state, cost, predicted, length, slope2, length_of_box, tolerance, limit)
-
-    def keep(new: list[Any], old: list[Any]) -> list[Any]:
-        return [dr.select(accepted, a, b) for a, b in zip(new, old, strict=True)]
-
-    return _State(u=keep(trial, u), low=low, high=high, A=keep(packed, state.A), g=keep(gradient, g), **walk)
-
-
-def verdict(
-    state: _State,
-    cost: Any,
-    predicted: Any,
-    length: Any,
-    slope2: Any,
-    length_of_box: Any,
-    tolerance: Any,
-    limit: Any,
-) -> tuple[Any, dict[str, Any]]:
-    """Which lanes accept what they tried, and what becomes of all of a state but unknowns and normal equations.
-
-    ``length`` is the longest of the steps tried, in units of the range of each unknown, ``slope2`` the largest squared
-    cosine between the residuals and the column of J of an unknown that is not held, before the step.
-    """
-    import drjit as dr
-
     first = ~dr.isfinite(state.cost)
     finite = dr.isfinite(cost)
     accepted = finite & (((cost < state.cost) & (predicted > 0.0)) | first)
@@ -496,6 +462,15 @@ def verdict(
     growth = dr.select(accepted, 2.0, dr.minimum(2.0 * state.growth, 64.0))
 
     # a step is small because the minimum is near only if damping has not made it so
+    length = dr.zeros(type(cost), 1)
+    leaving = _leaving(g, u, low, high)
+    slope2 = dr.zeros(type(cost), 1)  # largest squared cosine between the residuals and a column of J
+    length_of_box = dr.zeros(type(cost), 1)
+    for i in range(size):
+        length_of_box = dr.maximum(length_of_box, high[i] - low[i])
+        length = dr.maximum(length, dr.abs(delta[i]) / dr.maximum(high[i] - low[i], 1e-300))
+        cosine2 = g[i] * g[i] / dr.maximum(2.0 * A[i][i] * state.cost, 1e-300)
+        slope2 = dr.maximum(slope2, dr.select(leaving[i], 0.0, cosine2))
     free = state.damping <= 1.0
     U = type(state.status)
     slow = dr.select(state.cost - cost > CREEPING * state.cost, U(0), state.slow + 1)
@@ -510,15 +485,23 @@ def verdict(
     held = length_of_box <= 0.0
     begun = dr.select(held, U(int(Status.ZERO_GRADIENT)), U(int(Status.RUNNING)))
     status = dr.select(first, dr.select(finite, begun, U(int(Status.NOT_FINITE))), status)
-    walk = {
-        "cost": dr.select(accepted, cost, state.cost),
-        "damping": damping,
-        "growth": growth,
-        "status": status,
-        "iterations": state.iterations + 1,
-        "slow": dr.select(first, U(0), slow),
-    }
-    return accepted, walk
+
+    def keep(new: list[Any], old: list[Any]) -> list[Any]:
+        return [dr.select(accepted, a, b) for a, b in zip(new, old, strict=True)]
+
+    return _State(
+        u=keep(trial, u),
+        low=low,
+        high=high,
+        cost=dr.select(accepted, cost, state.cost),
+        A=keep(packed, state.A),
+        g=keep(gradient, g),
+        damping=damping,
+        growth=growth,
+        status=status,
+        iterations=state.iterations + 1,
+        slow=dr.select(first, U(0), slow),
+    )
 
 
 def _wide_normal_equations(residuals: Residuals, u: list[Any], lane: Any) -> tuple[Any, list[Any], list[Any]]:
@@ -585,6 +568,7 @@ def point_sums(
     Float = type(u[0])
     triangle = [(i, j) for i in range(size) for j in range(i + 1)]
 
+    # what a turn does not change is no state of the loop: with it Dr.Jit would record the turn twice
     def body(place: Any, cost: Any, A: list[Any], g: list[Any]) -> tuple[Any, ...]:
         point = place if order is None else dr.gather(type(lane), order, place)
         r, J = _jacobian(residuals.function, u, lane, point)
