@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pbrdf.errors import FitError
+from pbrdf.inversion.minimise import solve
 from pbrdf.inversion.observations import Observations
 from pbrdf.inversion.optimum import Optimum
 from pbrdf.inversion.problem import predict, residuals
-from pbrdf.inversion.solver import Status, solve
+from pbrdf.inversion.solver import Status
 
 if TYPE_CHECKING:
     import xarray as xr

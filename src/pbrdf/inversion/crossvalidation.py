@@ -18,10 +18,11 @@ from pbrdf.errors import FitError
 from pbrdf.inversion.comparison import compare
 from pbrdf.inversion.fit import fit
 from pbrdf.inversion.holdout import Prediction, prediction_errors
+from pbrdf.inversion.minimise import solve
 from pbrdf.inversion.observations import Observations
 from pbrdf.inversion.problem import Space, residuals
 from pbrdf.inversion.result import FitResult
-from pbrdf.inversion.solver import Solution, Status, solve
+from pbrdf.inversion.solver import Solution, Status
 from pbrdf.inversion.thinning import draw
 from pbrdf.models import DoubleGauss, Model
 

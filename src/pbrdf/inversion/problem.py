@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from pbrdf.backend import get_backend
 from pbrdf.errors import FitError
+from pbrdf.inversion.block_solver import BlockResiduals
+from pbrdf.inversion.blocks import Blocks, Key
 from pbrdf.inversion.forward import channel_values, measured_mueller
 from pbrdf.inversion.observations import Observations
 from pbrdf.inversion.solver import Residuals, linearise
@@ -140,10 +143,33 @@ class Space:
         """The groups or wavelengths that have unknowns of their own."""
         return list(dict.fromkeys(term.label for term in self.terms if term.split == split))
 
+    @cached_property
+    def blocks(self) -> Blocks | None:
+        """Which free parameters count for one group or wavelength only; None where all count for all data."""
+        return Blocks.of([Key((t.nuisance, t.role), t.split, t.label) for t in self.terms])
+
+    @cached_property
+    def of_a_block(self) -> Space:
+        """The free parameters that count in one block, in the order of :attr:`Blocks.counting`: as many in each."""
+        if self.blocks is None:
+            return self
+        columns = self.blocks.counting[0]
+        own = [
+            replace(term, split=None, label=None) if term.split == self.blocks.split else term
+            for term in (self.terms[c] for c in columns)
+        ]
+        return replace(
+            self,
+            free=tuple(self.free[c] for c in columns),
+            lower=self.lower[columns],
+            upper=self.upper[columns],
+            terms=tuple(own),
+        )
+
 
 def residuals(
     space: Space, data: Sequence[Observations], starts: int = 1, accuracy: str | None = None
-) -> Residuals:
+) -> Residuals | BlockResiduals:
     """Weighted residuals (model − measured)/std of several data sets of the same form.
 
     Where the errors of the channels are correlated, the residuals are W (model − measured) with WᵀW the inverse
@@ -179,7 +205,7 @@ def residuals(
     backend = get_backend()
     Float, UInt32 = backend.Float, backend.UInt32
     points = first.values.shape[1]
-    signals = _Signals(space, data, accuracy)
+    signals = _Signals(space.of_a_block, data, accuracy)
     factors = None
     if any(o.correlation is not None for o in data):
         size = len(first.channels)
@@ -219,7 +245,19 @@ def residuals(
 
     # grazing geometries take more work: side by side with their like
     order = np.argsort(np.maximum(first.theta_i, first.theta_r), kind="stable")
-    return Residuals(function, points, _penalty(space), space.loss, order)
+    if space.blocks is None:
+        return Residuals(function, points, _penalty(space), space.loss, order)
+    place = space.blocks.places(getattr(first, space.blocks.split))
+    blocks = len(space.blocks.labels)
+    if (place == blocks).any():
+        raise FitError(f"data of a {space.blocks.split} without parameters of its own cannot be fitted")
+    return BlockResiduals(
+        blocks=space.blocks,
+        residuals=Residuals(function, points, loss=space.loss),
+        order=order[np.argsort(place[order], kind="stable")],
+        begin=np.searchsorted(np.sort(place), np.arange(blocks + 1)),
+        penalty=_block_penalty(space),
+    )
 
 
 def predict(
@@ -248,8 +286,9 @@ def predict(
     backend = get_backend()
     size = len(data.theta_i)
     point = dr.arange(backend.UInt32, size)
-    u = [dr.opaque(backend.Float, float(v), size) for v in unknowns]
-    values, _ = _Signals(space, [data], None)(u, dr.zeros(backend.UInt32, size), point, channels)
+    counting, _ = _at_points(space, np.asarray(unknowns, dtype=float)[None], data)
+    u = [backend.upload(backend.Float, column) for column in counting[0].T]
+    values, _ = _Signals(space.of_a_block, [data], None)(u, dr.zeros(backend.UInt32, size), point, channels)
     arrays = [backend.Float(v) + dr.zeros(backend.Float, size) for v in values]
     dr.eval(arrays)
     return {name: array.numpy() for name, array in zip(channels, arrays, strict=True)}
@@ -282,15 +321,28 @@ def derivatives(
     batch, size = len(unknowns), len(data.theta_i)
     UInt32 = get_backend().UInt32
     count = dr.opaque(UInt32, size)
-    signals = _Signals(space, [data], None)
+    signals = _Signals(space.of_a_block, [data], None)
+    counting, place = _at_points(space, unknowns, data)
 
     def function(u: list[Any], lane: Any, point: Any) -> tuple[list[Any], Any]:
         # a lane for each geometry of each set of unknowns
         return signals(u, UInt32(0), lane % count, channels)
 
-    values, jacobian = linearise(function, unknowns.repeat(size, axis=0), len(channels))
+    values, jacobian = linearise(function, counting.reshape(batch * size, -1), len(channels))
     shape = (batch, size, len(channels))
-    return values.reshape(shape), jacobian.reshape(*shape, -1)
+    jacobian = jacobian.reshape(*shape, -1)
+    if space.blocks is not None:
+        jacobian = space.blocks.spread(jacobian, place)
+    return values.reshape(shape), jacobian
+
+
+def _at_points(space: Space, unknowns: np.ndarray, data: Observations) -> tuple[np.ndarray, np.ndarray]:
+    """The unknowns that count at each geometry, (B, P) to (B, G, …), and the block of each geometry, shape (G,)."""
+    size = len(data.theta_i)
+    if space.blocks is None:
+        return np.broadcast_to(unknowns[:, None], (len(unknowns), size, unknowns.shape[1])), np.zeros(size)
+    place = space.blocks.places(getattr(data, space.blocks.split))
+    return space.blocks.at(unknowns, place), place
 
 
 class _Signals:
@@ -401,5 +453,18 @@ def _penalty(space: Space) -> Any:
                     slope = 0.5 / value
                 found.append((i, (value - mean) * weight, slope * weight))
         return found
+
+    return penalty
+
+
+def _block_penalty(space: Space) -> Any:
+    """Residuals of the priors of all unknowns and their derivatives, or None; see :class:`BlockResiduals`."""
+    priors = np.array([(0.0, np.inf) if term.prior is None else term.prior for term in space.terms])
+    if np.isinf(priors[:, 1]).all():
+        return None
+
+    def penalty(u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        values = space.to_parameters(u)
+        return (values - priors[:, 0]) / priors[:, 1], space.derivative(values) / priors[:, 1]
 
     return penalty

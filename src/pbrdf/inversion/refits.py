@@ -9,10 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from pbrdf.inversion.minimise import solve
 from pbrdf.inversion.observations import Observations
 from pbrdf.inversion.optimum import Optimum
 from pbrdf.inversion.problem import Space, residuals
-from pbrdf.inversion.solver import Solution, Status, solve
+from pbrdf.inversion.solver import Solution, Status
 from pbrdf.inversion.statistics import covariance, prior_spread
 
 __all__ = ["Lowest", "Optima", "Refit"]

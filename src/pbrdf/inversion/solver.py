@@ -229,7 +229,7 @@ def solve(
         if progress is not None:
             progress(max(batch - len(lanes), 0), batch)
     solution = result.solution()
-    solution.status[_nothing_to_gain(solution, lower, upper)] = Status.SMALL_REDUCTION
+    solution.status[nothing_to_gain(solution, lower, upper)] = Status.SMALL_REDUCTION
     return solution
 
 
@@ -539,7 +539,7 @@ def _wide_normal_equations(
     total: list[Any] | None = None
     for begin in range(0, points, slice_):
         end = dr.select(wanted, dr.opaque(UInt32, min(begin + slice_, points)), 0)
-        cost, A, g = _sums(
+        cost, A, g = point_sums(
             residuals, shared_u, shared_lane, offset + dr.opaque(UInt32, begin), places, end, order
         )
         dr.eval(cost, A, g)
@@ -561,7 +561,7 @@ def _normal_equations(
     UInt32 = type(lane)
     one = dr.opaque(UInt32, 1)
     end = dr.select(going, dr.opaque(UInt32, residuals.points), 0)
-    cost, A, g = _sums(residuals, u, lane, UInt32(0), one, end, None)
+    cost, A, g = point_sums(residuals, u, lane, UInt32(0), one, end, None)
     return _with_penalty(residuals, u, cost, A, g)
 
 
@@ -578,7 +578,7 @@ def _with_penalty(
     return cost, A, g
 
 
-def _sums(
+def point_sums(
     residuals: Residuals, u: list[Any], lane: Any, first: Any, stride: Any, end: Any, order: Any | None
 ) -> tuple[Any, list[Any], list[Any]]:
     """½ Σ r², the lower triangle of JᵀJ by rows, and Jᵀr over the points first, first + stride, … before end."""
@@ -588,7 +588,8 @@ def _sums(
     Float = type(u[0])
     triangle = [(i, j) for i in range(size) for j in range(i + 1)]
 
-    def body(place: Any, u: list[Any], lane: Any, cost: Any, A: list[Any], g: list[Any]) -> tuple[Any, ...]:
+    # what a turn does not change is no state of the loop: with it Dr.Jit would record the turn twice
+    def body(place: Any, cost: Any, A: list[Any], g: list[Any]) -> tuple[Any, ...]:
         point = place if order is None else dr.gather(type(lane), order, place)
         r, J = _jacobian(residuals.function, u, lane, point)
         if residuals.loss == "linear":
@@ -601,19 +602,19 @@ def _sums(
             weighted = [[x * slope for x, (_, slope) in zip(column, losses, strict=True)] for column in J]
         A = [a + _inner(weighted[i], J[j]) for a, (i, j) in zip(A, triangle, strict=True)]
         g = [b + _inner(weighted[i], r) for i, b in enumerate(g)]
-        return place + stride, u, lane, cost, A, g
+        return place + stride, cost, A, g
 
     zero = Float(0.0)
     with dr.suspend_grad():
         u = [dr.detach(v) for v in u]
     out = dr.while_loop(
-        (first, u, lane, zero, [zero] * len(triangle), [zero] * size),
+        (first, zero, [zero] * len(triangle), [zero] * size),
         lambda place, *_: place < end,
         body,
         mode="symbolic",
         label="points",
     )
-    return out[3], list(out[4]), list(out[5])
+    return out[1], list(out[2]), list(out[3])
 
 
 def _jacobian(function: Function, u: list[Any], lane: Any, point: Any) -> tuple[list[Any], list[list[Any]]]:
@@ -722,7 +723,7 @@ def _damped_step(
     return [dr.select(held[i], known[i], x[i] * scale[i]) for i in range(size)]
 
 
-def _nothing_to_gain(solution: Solution, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
+def nothing_to_gain(solution: Solution, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
     """Numbers of the lanes that stopped short though no step, however long, promises more than nothing."""
     found = []
     for lane in np.flatnonzero(np.isin(solution.status, (Status.STALLED, Status.ITERATIONS))):

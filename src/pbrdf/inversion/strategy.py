@@ -17,9 +17,10 @@ import numpy as np
 
 from pbrdf.errors import FitError
 from pbrdf.inversion.clusters import cluster
+from pbrdf.inversion.minimise import solve
 from pbrdf.inversion.observations import Observations
 from pbrdf.inversion.problem import Space, residuals
-from pbrdf.inversion.solver import Solution, solve
+from pbrdf.inversion.solver import Solution
 from pbrdf.inversion.thinning import thinned
 from pbrdf.optics.half_difference import facet_tilt
 
