@@ -35,6 +35,8 @@ if TYPE_CHECKING:
 __all__ = ["fit"]
 
 OBJECTIVES = ("stokes", "paper")
+#: Geometries among which are looked for as many different ones as there are parameters, before all are.
+_FEW = 1000
 
 
 def fit(
@@ -149,7 +151,7 @@ def fit(
         bare = Observations.from_dataset(dataset.drop_vars(stated, errors="ignore"), None, objective)
         observations = bare.with_covariance(np.asarray(covariance))
     held = hold_out.mask(dataset, seed) if hold_out else np.zeros(observations.values.shape[1], dtype=bool)
-    fitted_data = observations.subset(~held)
+    fitted_data = observations.subset(~held) if held.any() else observations
     space, begin = space_of(model, options or {}, fix or {}, free, bounds or {}, start or {}, fitted_data)
     space = with_terms(space, fitted_data, priors or {}, split or {}, nuisances, bounds or {}, loss)
     if fitted_data.count <= len(space.free):
@@ -157,7 +159,11 @@ def fit(
             f"{fitted_data.count} measured values cannot determine {len(space.free)} parameters: measure "
             "more, hold out less, or fix parameters"
         )
-    places, distinct = fitted_data.distinct(space.labels("group") != [], space.labels("wavelength") != [])
+    split_by = space.labels("group") != [], space.labels("wavelength") != []
+    # mostly the first few show that there are enough
+    places, distinct = fitted_data.subset(slice(_FEW)).distinct(*split_by)
+    if distinct < len(space.free):
+        places, distinct = fitted_data.distinct(*split_by)
     if distinct < len(space.free):
         raise FitError(
             f"{fitted_data.count} values at {places} {'geometry' if places == 1 else 'different geometries'} cannot "
@@ -222,7 +228,9 @@ def _summarise(
     comparison["near_specular"] = ("geometry", near)
 
     chi2 = 2.0 * float(solution.cost[best])
-    modelled = np.stack([comparison[f"{c}_modelled"].values[~held] for c in fitted_data.channels])
+    modelled = [comparison[f"{c}_modelled"].values for c in fitted_data.channels]
+    if held.any():
+        modelled = [values[~held] for values in modelled]
     quality = goodness(
         chi2,
         fitted_data.values,

@@ -101,7 +101,8 @@ class Observations:
             scale /= np.pi
         elif quantity not in ("brdf", NORMALISED):
             scale /= np.cos(ds["theta_i"].values)
-        ds = to_brdf_scale(ds)
+        if quantity not in ("brdf", NORMALISED):
+            ds = to_brdf_scale(ds)
         measured = measured_channels(ds)
         if not measured:
             raise FitError("the data set holds no measured value")
@@ -137,26 +138,28 @@ class Observations:
         known, unstated = True, 0
         channels = tuple(name for name in columns if np.isfinite(columns[name]).any())
         for name in channels:
-            guess = model.standard_uncertainty(name, intensity, scale)
             given = np.isfinite(uncertainties[name]) & (noise is None or objective == "paper")
             finite = np.isfinite(columns[name])
             if noise is None and objective == "stokes" and (given & finite).any():
                 # a value without an uncertainty among others that have one is left out, not the others' uncertainties
-                columns[name] = np.where(given, columns[name], np.nan)
-                unstated += int((finite & ~given).sum())
+                if left_out := int((finite & ~given).sum()):
+                    columns[name] = np.where(given, columns[name], np.nan)
+                    unstated += left_out
                 continue
             known &= objective == "stokes" and model.absolute_scale
+            guess = model.standard_uncertainty(name, intensity, scale)
             uncertainties[name] = np.where(given, uncertainties[name], guess)
         values = np.stack([columns[name] for name in channels])
         std = np.stack([uncertainties[name] for name in channels])
         absent = ~(np.isfinite(values) & np.isfinite(std))
+        values[absent], std[absent] = 0.0, np.inf
         result = cls(
             theta_i=ds["theta_i"].values,
             theta_r=ds["theta_r"].values,
             phi=ds["phi"].values,
             channels=channels,
-            values=np.where(absent, 0.0, values),
-            std=np.where(absent, np.inf, std),
+            values=values,
+            std=std,
             illumination=tuple(float(v) for v in ds.attrs["illumination"]),  # type: ignore[arg-type]
             std_known=known,
             group=ds["group"].values,
@@ -260,8 +263,8 @@ class Observations:
         """Whether any channel carries polarisation."""
         return any(name not in ("I", "m00") for name in self.channels)
 
-    def subset(self, keep: np.ndarray) -> Observations:
-        """Only some geometries; ``keep`` is a mask or an index array of shape (G,)."""
+    def subset(self, keep: np.ndarray | slice) -> Observations:
+        """Only some geometries; ``keep`` is a mask of shape (G,), an index array or a slice."""
         chosen: dict[str, Any] = {
             name: None if column is None else column[keep]
             for name in ("theta_i", "theta_r", "phi", "group", "wavelength", "scale", "correlation")

@@ -214,13 +214,9 @@ def residuals(
             for i in range(size)
             for j in range(i + 1)
         }
-    measured, weights = (
-        [
-            backend.upload(Float, np.concatenate([getattr(o, what)[c] for o in data]))
-            for c in range(len(first.channels))
-        ]
-        for what in ("values", "weights")
-    )
+    channels = range(len(first.channels))
+    measured = [backend.upload(Float, np.concatenate([o.values[c] for o in data])) for c in channels]
+    weights = [backend.upload(Float, np.concatenate([1.0 / o.std[c] for o in data])) for c in channels]
     divisor = dr.opaque(UInt32, starts)
     stride = dr.opaque(UInt32, points)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,19 +43,19 @@ class Goodness:
 def goodness(
     chi2: float,
     values: np.ndarray,
-    modelled: np.ndarray,
+    modelled: Sequence[np.ndarray],
     std: np.ndarray,
     channels: tuple[str, ...],
     free: int,
     std_known: bool,
 ) -> Goodness:
-    """Goodness of fit from measured and modelled values of shape (C, G); infinite ``std`` = not measured."""
+    """Goodness of fit from measured and modelled values, (C, G); infinite ``std`` = not measured."""
     measured = np.isfinite(std)
     count = int(measured.sum())
     freedom = count - free
     r_squared = {}
     for c, name in enumerate(channels):
-        y, f = values[c, measured[c]], modelled[c, measured[c]]
+        y, f = values[c, measured[c]], modelled[c][measured[c]]
         spread = float(((y - y.mean()) ** 2).sum()) if y.size else 0.0
         r_squared[name] = 1.0 - float(((y - f) ** 2).sum()) / spread if spread > 0.0 else math.nan
     misfit = chi2 if std_known else count * math.log(max(chi2, 1e-300) / count)

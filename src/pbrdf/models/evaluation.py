@@ -218,10 +218,10 @@ def _evaluate_numpy(
         shapes = ", ".join(f"{k} {a.shape}" for k, a in arrays.items() if a.ndim)
         raise ModelError(f"angles and parameters do not broadcast against each other: {shapes}") from error
     total = math.prod(grid)
-    flat = {k: (a.item() if a.size == 1 else np.broadcast_to(a, grid).ravel()) for k, a in arrays.items()}
+    flat = {k: a.item() if a.size == 1 else _flat(a, grid) for k, a in arrays.items()}
     backend = get_backend()
     width = math.prod(shape)
-    pieces = []
+    result = np.empty((total, width))
     absent = [p.name for p in model.parameters if p.vanishing and not np.any(arrays[p.name])]
     for start in range(0, total, CHUNK):
         stop = min(start + CHUNK, total)
@@ -230,9 +230,19 @@ def _evaluate_numpy(
         out = dr.empty(backend.Float, (stop - start) * width)
         for lanes in model.lane_groups(piece, stop - start, part):
             _launch(model, backend, piece, inputs, lanes, stop - start, absent, part, function, out)
-        pieces.append(out.numpy())
-    result = pieces[0] if len(pieces) == 1 else np.concatenate(pieces or [np.empty(0)])
+        if total <= CHUNK:
+            result = out.numpy().reshape(-1, width)  # Dr.Jit's memory, not a copy
+        else:
+            result[start:stop] = out.numpy().reshape(-1, width)
+        del inputs, out  # the next piece takes their memory
     return result.reshape(*grid, *shape)
+
+
+def _flat(array: np.ndarray, grid: tuple[int, ...]) -> Any:
+    """What a slice of the flattened grid can be taken from, without a copy of it all."""
+    if array.shape == grid and array.flags.c_contiguous:
+        return array.ravel()
+    return np.broadcast_to(array, grid).flat
 
 
 def _launch(
