@@ -244,7 +244,7 @@ def predict(
     backend = get_backend()
     size = len(data.theta_i)
     point = dr.arange(backend.UInt32, size)
-    u = [dr.opaque(backend.Float, float(v), size) for v in unknowns]
+    u = [dr.opaque(backend.Float, float(v)) for v in unknowns]
     values, _ = _Signals(space, [data], None)(u, dr.zeros(backend.UInt32, size), point, channels)
     arrays = [backend.Float(v) + dr.zeros(backend.Float, size) for v in values]
     dr.eval(arrays)
