@@ -34,6 +34,7 @@ benchmark: $(TEST_STAMP)
 	$(BIN)/python benchmarks/virtual_experiments.py
 	$(BIN)/python benchmarks/coverage.py
 	$(BIN)/python benchmarks/rendering.py
+	$(BIN)/python benchmarks/memory.py
 	$(BIN)/python benchmarks/domain.py
 	$(BIN)/python benchmarks/domain.py --single
 	$(BIN)/python benchmarks/read_csv.py

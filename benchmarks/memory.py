@@ -9,8 +9,8 @@ given as a multiple of the inputs and outputs:
 * evaluation: three angles (3 × 8 bytes) and a Mueller matrix (16 × 8 bytes) a direction; four times as many directions
   are evaluated in several pieces;
 * fit: all arrays of the data set (angles, group, I, Q, U and their standard uncertainties) and of the result's
-  ``comparison`` (measured, modelled, residual and uncertainty of each channel, DoLP, facet tilt and masks). The result's
-  own copy of the observations counts as memory taken, not as output.
+  ``comparison`` (measured, modelled, residual and uncertainty of each channel, DoLP, facet tilt and masks). The
+  observations that the result keeps for later work count as memory taken, not as output.
 
 Linux only, as the highest resident memory must be set back before the call. The script ends with status 1 if one takes
 more than twice its inputs and outputs.

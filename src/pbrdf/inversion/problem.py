@@ -282,8 +282,11 @@ def predict(
     backend = get_backend()
     size = len(data.theta_i)
     point = dr.arange(backend.UInt32, size)
-    counting, _ = _at_points(space, np.asarray(unknowns, dtype=float)[None], data)
-    u = [backend.upload(backend.Float, column) for column in counting[0].T]
+    if space.blocks is None:
+        u = [dr.opaque(backend.Float, float(v)) for v in unknowns]
+    else:
+        counting, _ = _at_points(space, np.asarray(unknowns, dtype=float)[None], data)
+        u = [backend.upload(backend.Float, column) for column in counting[0].T]
     values, _ = _Signals(space.of_a_block, [data], None)(u, dr.zeros(backend.UInt32, size), point, channels)
     arrays = [backend.Float(v) + dr.zeros(backend.Float, size) for v in values]
     dr.eval(arrays)

@@ -22,7 +22,7 @@ from pbrdf.optics.stokes import STOKES
 
 __all__ = ["CHUNK", "Evaluable", "check_angles", "check_incident", "horizon_guard", "mueller", "stokes"]
 
-#: Directions evaluated at a time: bounds the memory (16 float64 each) and keeps all threads busy.
+#: Directions evaluated at a time, at most: bounds the memory (16 float64 each) and keeps all threads busy.
 CHUNK = 1 << 20
 #: Cosines up to this count as at or below the horizon, where the BRDF is 0.
 _HORIZON = 1e-12
@@ -223,8 +223,10 @@ def _evaluate_numpy(
     width = math.prod(shape)
     result = np.empty((total, width))
     absent = [p.name for p in model.parameters if p.vanishing and not np.any(arrays[p.name])]
-    for start in range(0, total, CHUNK):
-        stop = min(start + CHUNK, total)
+    # pieces as long as each other, so that each takes the memory of the one before
+    pieces = math.ceil(total / CHUNK)
+    for i in range(pieces):
+        start, stop = total * i // pieces, total * (i + 1) // pieces
         piece = {k: (v if isinstance(v, float) else v[start:stop]) for k, v in flat.items()}
         inputs = {k: backend.upload(backend.Float, v) for k, v in piece.items() if not isinstance(v, float)}
         out = dr.empty(backend.Float, (stop - start) * width)
@@ -234,7 +236,7 @@ def _evaluate_numpy(
             result = out.numpy().reshape(-1, width)  # Dr.Jit's memory, not a copy
         else:
             result[start:stop] = out.numpy().reshape(-1, width)
-        del inputs, out  # the next piece takes their memory
+        del inputs, out
     return result.reshape(*grid, *shape)
 
 
