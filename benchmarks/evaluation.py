@@ -14,6 +14,11 @@ facets, and "branchless", without it, which lets g++ vectorise the loop over the
 from the equations, apart from pbrdf's code, and use the same quadrature. All must agree to 1e-9 of f00, else
 the script ends with status 1.
 
+What a user would take instead is timed too, ``peers/other_models.py``: Mitsuba's ``roughconductor`` and ``pplastic``
+through ``llvm_ad_mono_polarized`` where Mitsuba is installed, SCATMECH's shadowed facets where pySCATMECH is
+(``pip install pySCATMECH``). These are other models, Mitsuba's in single precision: the cost of a direction is all that
+is compared. SCATMECH's facets are pbrdf's specular part and must agree with it to 1e-6 of f00.
+
 Times are minima over interleaved repeats. They depend on the machine (vector units, cores, memory) and on
 what else it is doing: only ratios out of one and the same run mean anything, and they too differ between
 machines.
@@ -39,6 +44,7 @@ from typing import Any
 
 import numpy as np
 from peers import double_gauss_numpy as numpy_peer
+from peers.other_models import mitsuba_peers, scatmech_peer
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
@@ -228,6 +234,63 @@ def measure(case: Case, count: int, repeat: int, peers: dict[str, Any], threads:
     }
 
 
+def measure_others(count: int, repeat: int) -> dict[str, Any]:
+    """Time other models in turn with pbrdf's ``mueller``; seconds a direction, and how far SCATMECH is off."""
+    model = DoubleGauss(**PAINT._asdict())
+    angles = random_geometries(count, 1.3)
+    functions: dict[str, Callable[[], Any]] = {"pbrdf mueller()": lambda: model.mueller(*angles)}
+    functions |= mitsuba_peers(model, angles)
+    counts = dict.fromkeys(functions, count)
+    difference = None
+    if (scatmech := scatmech_peer(model)) is not None:
+        few = [angle[: min(count, 20_000)] for angle in angles]
+        functions["SCATMECH facets"] = lambda: scatmech(*few)
+        counts["SCATMECH facets"] = few[0].size
+        # where the lobe is not yet 0
+        facets = model.mueller(*few, part="specular")
+        seen = facets[:, 0, 0] > 1e-12 * facets[:, 0, 0].max()
+        apart = np.abs(scatmech(*few) - facets).max(axis=(1, 2))
+        difference = float((apart[seen] / facets[seen, 0, 0]).max())
+    for function in functions.values():
+        function()
+    seconds: dict[str, list[float]] = {name: [] for name in functions}
+    for _ in range(repeat):
+        for name, function in functions.items():
+            for _ in range(1 if name == "SCATMECH facets" else 3):
+                start = time.perf_counter()
+                function()
+                seconds[name].append((time.perf_counter() - start) / counts[name])
+    return {
+        "count": counts,
+        "best_s_a_direction": {name: min(values) for name, values in seconds.items()},
+        "median_s_a_direction": {name: float(np.median(values)) for name, values in seconds.items()},
+        "scatmech_difference": difference,
+        "agree": difference is None or difference <= 1e-6,
+    }
+
+
+def show_others(console: Console, others: dict[str, Any]) -> None:
+    """Print what other models cost."""
+    table = Table(title="Other models, cost of a direction", title_justify="left", title_style="bold")
+    table.box, table.padding = SIMPLE_HEAD, (0, 1)
+    for heading in ("", "precision", "threads", "directions", "ns each", "÷ pbrdf"):
+        table.add_column(heading, justify="right" if heading not in ("", "precision") else "left")
+    best = others["best_s_a_direction"]
+    for name, seconds in best.items():
+        double = name in ("pbrdf mueller()", "SCATMECH facets")
+        table.add_row(
+            name,
+            "double" if double else "single",
+            "1" if name == "SCATMECH facets" else "all",
+            str(others["count"][name]),
+            f"{1e9 * seconds:.0f}",
+            f"{seconds / best['pbrdf mueller()']:.2f}x",
+        )
+    console.print(table)
+    if others["scatmech_difference"] is not None:
+        console.print(f"SCATMECH against pbrdf's specular part: {others['scatmech_difference']:.1e} of f00\n")
+
+
 def processor() -> str:
     """Name of the processor, as far as the system tells."""
     try:
@@ -309,11 +372,16 @@ def main() -> int:
     console.print(", ".join(f"{key} {value}" for key, value in machine.items()), highlight=False)
     results = [measure(case, count, repeat, peers, threads) for case in CASES]
     show(console, results)
+    others = measure_others(count, repeat)
+    show_others(console, others)
     if options.json is not None:
-        report = {"machine": machine, "tolerance": TOLERANCE, "cases": results}
+        report = {"machine": machine, "tolerance": TOLERANCE, "cases": results, "other_models": others}
         options.json.write_text(json.dumps(report, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
     if not all(result["agree"] for result in results):
         console.print(f"[red]The implementations differ by more than {TOLERANCE:g} of f00.[/red]")
+        return 1
+    if not others["agree"]:
+        console.print("[red]SCATMECH and pbrdf's specular part differ by more than 1e-6 of f00.[/red]")
         return 1
     return 0
 

@@ -50,7 +50,9 @@ def example(name, **choice):
 
 
 @pytest.mark.parametrize("name", ["double-gauss", "reciprocal-double-gauss"])
-@pytest.mark.parametrize("variant", SCALAR + LLVM + CUDA)
+@pytest.mark.parametrize(
+    "variant", [*SCALAR, *LLVM, *(pytest.param(variant, marks=pytest.mark.cuda) for variant in CUDA)]
+)
 def test_every_variant(variant, name):
     mi = use(variant)
     model = example(name)
