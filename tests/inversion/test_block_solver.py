@@ -11,7 +11,7 @@ from scipy.optimize import least_squares
 
 from pbrdf.backend import get_backend
 from pbrdf.inversion import block_solver
-from pbrdf.inversion.block_solver import BlockResiduals, solve_blocks
+from pbrdf.inversion.block_solver import BlockResiduals, recombined, solve_blocks
 from pbrdf.inversion.blocks import Blocks, Key
 from pbrdf.inversion.solver import Residuals, Status, solve
 
@@ -240,6 +240,29 @@ def test_residuals_that_are_not_finite_end_their_start_only():
     start[1, problem.own[2, 0]] = np.nan
     solution = solve_blocks(problem.blocks(), start, *problem.box())
     assert solution.status[1] == Status.NOT_FINITE and solution.converged[[0, 2]].all()
+
+
+def test_the_best_end_takes_what_other_starts_found_for_single_blocks():
+    """Each of 12 blocks has a wrong minimum near v = −1: no start of 8 avoids all of them, but some start does each."""
+    groups = 12
+
+    def function(u, lane, point):
+        # u[0] is shared, near v
+        return [u[1] * u[1] - 1.0, 0.3 * (u[1] - 1.0), 0.2 * (u[0] - u[1])], None
+
+    blocks = Blocks("group", tuple(range(groups)), np.array([0]), 1 + np.arange(groups)[:, None])
+    problem = BlockResiduals(blocks, Residuals(function, groups), np.arange(groups), np.arange(groups + 1))
+    low, high = np.full(groups + 1, -2.0), np.full(groups + 1, 2.0)
+    start = np.random.default_rng(3).uniform(-1.5, 1.5, (8, groups + 1))
+    found = solve_blocks(problem, start, low, high)
+    assert found.converged.all() and (found.u[:, 1:] < 0.0).any(axis=1).all()
+    better = recombined(problem, found, low, high)
+    assert better.cost.min() == pytest.approx(0.0, abs=1e-12)
+    np.testing.assert_allclose(better.u[better.best()], 1.0, atol=1e-6)
+    others = np.arange(8) != found.best()
+    np.testing.assert_array_equal(better.u[others], found.u[others])
+    again = recombined(problem, better, low, high)
+    np.testing.assert_array_equal(again.u, better.u)
 
 
 def test_blocks_are_of_the_split_that_has_most_unknowns():

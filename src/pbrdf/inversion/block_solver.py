@@ -26,6 +26,7 @@ from pbrdf.inversion.solver import (
     BOUND_PASSES,
     CREEPING,
     LAUNCH,
+    NOTHING_TO_GAIN,
     PATIENCE,
     WIDTH,
     Residuals,
@@ -35,11 +36,13 @@ from pbrdf.inversion.solver import (
     point_sums,
 )
 
-__all__ = ["BlockResiduals", "solve_blocks"]
+__all__ = ["BlockResiduals", "recombined", "solve_blocks"]
 
 #: A step that promises no more than this part of the cost is the last: it is taken unseen. With χ² about 100 it is some
 #: 1e-4 standard errors long, and what it leaves is as small against it as it is against the one before.
 LAST_STEP = 1e-10
+#: How often the best end is put together anew from what all starts found for each block.
+RECOMBINATIONS = 3
 _TINY = np.finfo(float).tiny
 
 
@@ -114,7 +117,7 @@ def solve_blocks(
             arrived = _arrived(system, walk, u, trial, predicted, low, high, tolerance)
             last = np.isin(arrived, (Status.SMALL_STEP, Status.SMALL_REDUCTION)) & (predicted > 0.0)
             going = np.flatnonzero(arrived == Status.RUNNING)
-            cost = np.where(last, walk.cost - predicted, walk.cost)
+            cost = np.where(last, np.maximum(walk.cost - predicted, 0.0), walk.cost)
             # those that have arrived take their last step unseen: it is so short
             accepted = last.copy()
             if len(going):
@@ -124,6 +127,58 @@ def solve_blocks(
             u = np.where(accepted[:, None], trial, u)
             walk = walk.next(arrived, accepted, cost, predicted, max_iterations)
         result.status[nothing_to_gain(result, lower, upper)] = Status.SMALL_REDUCTION
+    return result
+
+
+def recombined(
+    problem: BlockResiduals,
+    found: Solution,
+    lower: np.ndarray,
+    upper: np.ndarray,
+    *,
+    max_iterations: int = 100,
+    tolerance: float = 1e-10,
+) -> Solution:
+    """Ends of many starts of one data set, the best one bettered by what others found for single blocks.
+
+    That one start finds the right optimum for every block is the less likely the more blocks there are; that some start
+    does for each is not. With the shared unknowns of the best end, each block takes its own from the start whose suit
+    it best, and all are fitted again from there.
+
+    Parameters
+    ----------
+    problem, lower, upper, max_iterations, tolerance
+        As of :func:`solve_blocks`, of which ``found`` is the result.
+
+    Returns
+    -------
+    Solution
+        The same, but for the best lane.
+    """
+    blocks = problem.blocks
+    lanes = np.flatnonzero(np.isfinite(found.cost))
+    if not len(lanes):
+        return found
+    best = found.best()
+    result = Solution(**{f.name: getattr(found, f.name).copy() for f in fields(Solution)})
+    evaluate = _Evaluation(problem)
+    for _ in range(RECOMBINATIONS):
+        u = result.u[lanes]
+        u[:, blocks.shared] = result.u[best, blocks.shared]
+        cost = evaluate.by_block(u, lanes)
+        cost[~np.isfinite(cost)] = np.inf
+        before = cost[np.searchsorted(lanes, best)].sum()
+        if not cost.min(axis=0).sum() < before * (1.0 - NOTHING_TO_GAIN):
+            break
+        mixed = result.u[best].copy()
+        mixed[blocks.own] = u[cost.argmin(axis=0)[:, None], blocks.own]
+        again = solve_blocks(
+            problem, mixed[None], lower, upper, max_iterations=max_iterations, tolerance=tolerance
+        )
+        if not again.cost[0] < result.cost[best]:
+            break
+        for f in fields(Solution):
+            getattr(result, f.name)[best] = getattr(again, f.name)[0]
     return result
 
 
@@ -280,6 +335,14 @@ class _Evaluation:
             system.shared[:, range(number), range(number)] += slope[:, blocks.shared] ** 2
             system.own[:, :, range(size), range(size)] += slope[:, blocks.own] ** 2
         return total, system
+
+    def by_block(self, u: np.ndarray, lanes: np.ndarray) -> np.ndarray:
+        """Cost of each block, shape (n, G), with the penalties of its own unknowns, not of the shared ones."""
+        blocks = self.problem.blocks
+        cost = self._sums(np.moveaxis(u[:, blocks.counting], 2, 0), lanes)[0]
+        if self.problem.penalty is not None:
+            cost = cost + 0.5 * (self.problem.penalty(u)[0][:, blocks.own] ** 2).sum(axis=2)
+        return cost
 
     def _sums(self, u: np.ndarray, lanes: np.ndarray) -> np.ndarray:
         """½ Σ r², the lower triangle of JᵀJ by rows, and Jᵀr of n problems and G blocks, shape (…, n, G).

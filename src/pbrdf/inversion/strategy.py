@@ -16,6 +16,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from pbrdf.errors import FitError
+from pbrdf.inversion.block_solver import BlockResiduals, recombined
 from pbrdf.inversion.clusters import cluster
 from pbrdf.inversion.minimise import solve
 from pbrdf.inversion.observations import Observations
@@ -92,15 +93,12 @@ def joint(
         found, (stage,) = joint(space, part, first, max_iterations, progress)
         solution = _on_all(space, data, part, found, low, high, max_iterations, progress)
         return solution, [replace(stage, name="search"), _stage("joint", space, solution, space.names, data)]
+    problem = residuals(space, [data], len(first), accuracy="draft")
     search = solve(
-        residuals(space, [data], len(first), accuracy="draft"),
-        first,
-        low,
-        high,
-        max_iterations=max_iterations,
-        tolerance=1e-6,
-        progress=progress,
+        problem, first, low, high, max_iterations=max_iterations, tolerance=1e-6, progress=progress
     )
+    if isinstance(problem, BlockResiduals):
+        search = recombined(problem, search, low, high, max_iterations=max_iterations, tolerance=1e-6)
     solution = _refine(space, data, search, low, high, max_iterations)
     return solution, [_stage("joint", space, solution, space.names, data)]
 
