@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -17,6 +18,10 @@ class ClosedForm(Optima):
     formula: Callable
     calls: list[np.ndarray] = field(default_factory=list)
 
+    @functools.cached_property
+    def chi2(self):
+        return self.formula(np.ones((1, self.u.shape[1]), dtype=bool), self.u[:, None])[1][:, 0]
+
     def refit(self, held, start):
         self.calls.append(start.copy())
         u, chi2 = self.formula(held, np.clip(start, self.low, self.high))
@@ -29,9 +34,8 @@ def closed_form(formula, u, error, tangent, low, high):
     size = u.shape[1]
     low, high = np.broadcast_to(low, size) * 1.0, np.broadcast_to(high, size) * 1.0
     tangent = np.broadcast_to(tangent, (len(u), size, size)) * 1.0
-    chi2 = formula(np.ones((1, size), dtype=bool), u[:, None])[1][:, 0]
     at_bound = (u <= low) | (u >= high)
-    return ClosedForm(None, [None] * len(u), low, high, u, chi2, at_bound, None, tangent, error, formula)
+    return ClosedForm(None, [None] * len(u), low, high, u, at_bound, None, tangent, error, formula)
 
 
 def one_unknown(chi2, u=0.0, error=1.0, low=-50.0, high=50.0):

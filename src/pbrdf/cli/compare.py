@@ -99,7 +99,7 @@ def compare(
     from pbrdf.files.atomic import require_writable_folder
     from pbrdf.files.digest import sha256_of
     from pbrdf.report.comparison.folder import write_comparison
-    from pbrdf.report.style import FIGURE_FORMATS
+    from pbrdf.report.style import FIGURE_FORMATS, leave_out_help_texts
 
     if figure_format not in FIGURE_FORMATS:
         raise PbrdfError(f"--figure-format {figure_format!r}: choose one of {', '.join(FIGURE_FORMATS)}")
@@ -138,6 +138,8 @@ def compare(
         raise FitError(f"{file}: {error}") from error
     settings = {"models": names, **arguments, "reading": reading.stated()}
     report = Compared(comparison, file, settings, command_line(), sha256_of(Path(file)))
+    if figures:
+        leave_out_help_texts()
     written = write_comparison(report, folder, figure_format=figure_format if figures else None)
     if quiet:
         print(folder)

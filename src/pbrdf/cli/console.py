@@ -82,14 +82,18 @@ def stage_bar(quiet: bool = False, first: str = "") -> Iterator[Callable[[str, i
     callable
         To be called with the name of the stage, the number of its finished pieces and of all, 0 if that is not known.
     """
+    if quiet:
+        yield lambda stage, finished, total: None
+        return
     from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
     console = Console(stderr=True)
-    if not quiet and not console.is_terminal:
+    if not console.is_terminal:
         with _lines_now_and_then(first) as show:
             yield show
         return
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
     with Progress(
         TextColumn("{task.description}"),
         BarColumn(),
@@ -97,7 +101,6 @@ def stage_bar(quiet: bool = False, first: str = "") -> Iterator[Callable[[str, i
         TimeElapsedColumn(),
         console=console,
         transient=True,
-        disable=quiet,
     ) as progress:
         task = progress.add_task(first, total=None)
         yield lambda stage, finished, total: progress.update(

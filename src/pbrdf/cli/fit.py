@@ -184,6 +184,7 @@ def fit(
     from pbrdf.report.fit.checks import run_checks
     from pbrdf.report.fit.folder import parse_formats, write_report
     from pbrdf.report.fit.subject import Report
+    from pbrdf.report.style import leave_out_help_texts
 
     parse_formats(figure_format, "--figure-format")
     arguments: dict[str, Any] = {
@@ -248,6 +249,8 @@ def fit(
         report = Report(
             result, dataset, file, settings, checks, command=command_line(), sha256=sha256_of(Path(file))
         )
+        if figures:
+            leave_out_help_texts()
         written = write_report(report, folder, figure_format=figure_format, figures=figures)
         unsettled |= not result.settled
         if quiet:

@@ -7,6 +7,8 @@ appears at once.
 from __future__ import annotations
 
 import errno
+import gc
+import os
 import sys
 import warnings
 from collections.abc import Iterator
@@ -152,8 +154,17 @@ app.command()(models)
 app.command()(doctor)
 
 
+def _start_lightly() -> None:
+    """Leave out work at the start of a process that takes as long as a command's own."""
+    # threads of OpenBLAS that wait for work spin for a tenth of a second each, unless told (2⁴ cycles) to sleep
+    os.environ.setdefault("OPENBLAS_THREAD_TIMEOUT", "4")
+    # what imports make by the hundred thousand stays: no use in looking through all of it again and again
+    gc.set_threshold(50_000, 20, 50)
+
+
 def main() -> None:
     """Run the command line; the entry point of ``pbrdf``."""
+    _start_lightly()
     for stream in (sys.stdout, sys.stderr):
         # An old Windows code page has no σ or χ: better a question mark than a crash.
         if hasattr(stream, "reconfigure"):

@@ -68,7 +68,7 @@ def plot(
 
     A paint's fit beside another model: `pbrdf plot paint-fit other.json --kind curves`
     """
-    from pbrdf.report.style import save_figure
+    from pbrdf.report.style import leave_out_help_texts, save_figure
 
     target = output or Path(f"{Path(sources[0]).stem}.png")
     for source in sources:
@@ -82,6 +82,7 @@ def plot(
         raise PbrdfError(f"{are}: --{option} is for files of data")
     if theta_i is not None and not 0.0 <= theta_i < 90.0:
         raise PbrdfError(f"--theta-i {theta_i:g}: the angle must be at least 0° and below 90°")
+    leave_out_help_texts()
     if kind is None and len(sources) == 1:
         figure = _overview(sources[0], reading, theta_i)
     else:

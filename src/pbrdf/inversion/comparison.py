@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,7 +17,7 @@ from pbrdf.optics.half_difference import facet_tilt
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["NEAR_SPECULAR", "compare", "near_specular_tilt"]
+__all__ = ["NEAR_SPECULAR", "compare", "compared_channels", "near_specular_tilt"]
 
 #: A facet tilted by less than this many widths of the lobe, but at most by this angle, counts as near-specular.
 NEAR_SPECULAR, NEAR_SPECULAR_LIMIT = 4.0, math.radians(15.0)
@@ -25,6 +26,11 @@ NEAR_SPECULAR, NEAR_SPECULAR_LIMIT = 4.0, math.radians(15.0)
 def near_specular_tilt(model: Model) -> float:
     """Facet tilt in radians below which a geometry counts as near-specular."""
     return min(math.atan(NEAR_SPECULAR * float(model.lobe_width())), NEAR_SPECULAR_LIMIT)
+
+
+def compared_channels(channels: Sequence[str]) -> tuple[str, ...]:
+    """Channels that are predicted beside measured ones: the same, and those of which intensity and DoLP are made."""
+    return tuple(dict.fromkeys((*channels, *(("m00", "m10", "m20") if "m00" in channels else "IQU"))))
 
 
 def compare(
@@ -48,10 +54,8 @@ def compare(
     """
     import xarray as xr
 
-    elements = "m00" in observations.channels
-    wanted = tuple(dict.fromkeys((*observations.channels, *(("m00", "m10", "m20") if elements else "IQU"))))
-    everything = predict(space, unknowns, observations, wanted)
-    if elements:
+    everything = predict(space, unknowns, observations, compared_channels(observations.channels))
+    if "m00" in observations.channels:
         everything |= {"I": everything["m00"], "Q": everything["m10"], "U": everything["m20"]}
     with np.errstate(divide="ignore", invalid="ignore"):
         everything["dolp"] = np.hypot(everything["Q"], everything["U"]) / everything["I"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -71,8 +72,6 @@ class Optima:
         Bounds of the unknowns, shape (P,).
     u
         Unknowns at the optimum of each data set, shape (D, P).
-    chi2
-        χ² there, shape (D,).
     at_bound
         Which unknowns stand on a bound, shape (D, P).
     information
@@ -88,7 +87,6 @@ class Optima:
     low: np.ndarray
     high: np.ndarray
     u: np.ndarray
-    chi2: np.ndarray
     at_bound: np.ndarray
     information: np.ndarray
     tangent: np.ndarray
@@ -109,10 +107,13 @@ class Optima:
             _linearised(matrix, prior_spread(low, high), on)
             for matrix, on in zip(information, at_bound, strict=True)
         ]
-        # χ² exactly as the solver sees it, priors included
-        chi2 = 2.0 * solve(residuals(space, data, 1), u, u, u).cost
         tangent, error = (np.stack(column) for column in zip(*linear, strict=True))
-        return cls(space, data, low, high, u, chi2, at_bound, information, tangent, error)
+        return cls(space, data, low, high, u, at_bound, information, tangent, error)
+
+    @functools.cached_property
+    def chi2(self) -> np.ndarray:
+        """χ² at the optimum of each data set, priors included, exactly as the solver sees it; shape (D,)."""
+        return 2.0 * solve(residuals(self.space, self.data, 1), self.u, self.u, self.u).cost
 
     def refit(self, held: np.ndarray, start: np.ndarray) -> Refit:
         """Fit every data set from S starts with some unknowns held at their starting values.

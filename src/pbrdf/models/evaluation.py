@@ -20,7 +20,16 @@ from pbrdf.models.parameters import Parameter
 from pbrdf.optics.geometry import Geometry, geometry_from_angles
 from pbrdf.optics.stokes import STOKES
 
-__all__ = ["CHUNK", "Evaluable", "check_angles", "check_incident", "horizon_guard", "mueller", "stokes"]
+__all__ = [
+    "CHUNK",
+    "Evaluable",
+    "brdf",
+    "check_angles",
+    "check_incident",
+    "horizon_guard",
+    "mueller",
+    "stokes",
+]
 
 #: Directions evaluated at a time, at most: bounds the memory (16 float64 each) and keeps all threads busy.
 CHUNK = 1 << 20
@@ -72,6 +81,11 @@ def mueller(model: Evaluable, theta_i: Any, theta_r: Any, phi: Any, part: str) -
         return [x for row in matrix for x in row]
 
     return _evaluate(model, theta_i, theta_r, phi, part, function, (4, 4))
+
+
+def brdf(model: Evaluable, theta_i: Any, theta_r: Any, phi: Any, part: str) -> Any:
+    """BRDF for natural light, m00, in 1/sr: what only polarised light needs is not computed. Arrays as of `mueller`."""
+    return _evaluate(model, theta_i, theta_r, phi, part, lambda matrix: [matrix[0][0]], (1,))[..., 0]
 
 
 def stokes(model: Evaluable, theta_i: Any, theta_r: Any, phi: Any, incident: Any, part: str) -> Any:

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from pbrdf.errors import ModelError
 from pbrdf.models.base import Model
+from pbrdf.models.evaluation import brdf
 
 __all__ = ["directional_hemispherical_reflectance"]
 
@@ -77,7 +78,7 @@ def _specular_reflectance(model: Model, theta_i: np.ndarray) -> np.ndarray:
     seen = (cos_beta > 0.0) & (r[:, 2] > 0.0)
     theta_r = np.where(seen, np.arctan2(np.hypot(r[:, 0], r[:, 1]), r[:, 2]), 0.0)
     phi = np.where(seen, np.arctan2(r[:, 1], r[:, 0]), 0.0)
-    f = model.stokes(theta_i[:, None, None], theta_r, phi, part="specular")[..., 0]
+    f = brdf(model, theta_i[:, None, None], theta_r, phi, "specular")
     return np.where(seen, f * r[:, 2] * 4.0 * cos_beta * cos_m**3 * area, 0.0).sum((1, 2))
 
 
@@ -88,5 +89,5 @@ def _diffuse_reflectance(model: Model, theta_i: np.ndarray) -> np.ndarray:
     cos_r = s * s
     solid_angle = (0.5 * weight * 2.0 * s)[:, None] * (2.0 * math.pi / AZIMUTHS)  # both halves of the azimuth
     phi = (np.arange(AZIMUTHS) + 0.5) * math.pi / AZIMUTHS
-    f = model.stokes(theta_i[:, None, None], np.arccos(cos_r)[:, None], phi, part="diffuse")[..., 0]
+    f = brdf(model, theta_i[:, None, None], np.arccos(cos_r)[:, None], phi, "diffuse")
     return (f * cos_r[:, None] * solid_angle).sum((1, 2))

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import io
 import math
+import struct
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from pbrdf.errors import DataError
 from pbrdf.files.atomic import atomic_file
@@ -22,6 +27,7 @@ __all__ = [
     "GREY",
     "RED",
     "Look",
+    "leave_out_help_texts",
     "looks_of",
     "new_figure",
     "panels",
@@ -55,9 +61,9 @@ _RC: dict[str, Any] = {
 }
 _DOTS_PER_INCH = 140
 #: Formats that figures are written in, with what Matplotlib is told. No dates, so that the same figure is the same
-#: file; PNG little compressed, as that takes half as long.
+#: file.
 FIGURE_FORMATS: dict[str, dict[str, Any]] = {
-    "png": {"dpi": _DOTS_PER_INCH, "pil_kwargs": {"compress_level": 1}},
+    "png": {"dpi": _DOTS_PER_INCH},
     "pdf": {"metadata": {"CreationDate": None}},
     "svg": {"metadata": {"Date": None}},
 }
@@ -171,4 +177,47 @@ def save_figure(figure: Figure, path: Path) -> None:
     if kind not in FIGURE_FORMATS:
         raise DataError(f"{path}: figures are written as {', '.join('.' + k for k in FIGURE_FORMATS)}")
     with styled(), atomic_file(path) as target:
-        figure.savefig(target, format=kind, **FIGURE_FORMATS[kind])
+        if kind == "png":
+            target.write_bytes(_png(figure))
+        else:
+            figure.savefig(target, format=kind, **FIGURE_FORMATS[kind])
+
+
+def _png(figure: Figure) -> bytes:
+    """The figure as PNG: opaque, every row as its difference from the one above.
+
+    Lines and letters on white differ little from row to row, so that the quickest compression makes smaller files of
+    these differences than Pillow does, which looks for the best filter of each row, in a quarter of its time.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    canvas = FigureCanvasAgg(figure)
+    canvas.print_figure(io.BytesIO(), format="rgba", **FIGURE_FORMATS["png"])
+    pixels = np.asarray(canvas.buffer_rgba())[..., :3]
+    height, width, _ = pixels.shape
+    flat = pixels.reshape(height, 3 * width)
+    rows = np.empty((height, 1 + 3 * width), dtype=np.uint8)
+    rows[:, 0] = 2  # the filter "up"
+    rows[0, 1:] = flat[0]
+    np.subtract(flat[1:], flat[:-1], out=rows[1:, 1:])
+    per_metre = round(_DOTS_PER_INCH / 0.0254)
+    chunks = {
+        b"IHDR": struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0),
+        b"pHYs": struct.pack(">IIB", per_metre, per_metre, 1),
+        b"IDAT": zlib.compress(rows, 1),
+        b"IEND": b"",
+    }
+    return b"\x89PNG\r\n\x1a\n" + b"".join(
+        struct.pack(">I", len(content)) + name + content + struct.pack(">I", zlib.crc32(name + content))
+        for name, content in chunks.items()
+    )
+
+
+def leave_out_help_texts() -> None:
+    """Have matplotlib loaded without the help texts that it composes for its classes, a third of the time it takes.
+
+    For processes in which nobody reads them, the command line's.
+    """
+    import matplotlib.artist
+
+    matplotlib.artist.kwdoc = lambda artist: ""

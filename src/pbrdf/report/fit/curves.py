@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pbrdf.inversion.comparison import compared_channels
 from pbrdf.inversion.observations import Observations
 from pbrdf.inversion.problem import predict
 from pbrdf.report.dataset.cuts import Cut
@@ -67,8 +68,15 @@ def model_curves(report: Report, cuts: list[Cut], names: Sequence[str]) -> dict[
         wavelength=ds["wavelength"].values[rows] if "wavelength" in ds.coords else None,
         scale=1.0 / np.cos(theta_i[there]) if ds.attrs["quantity"] in ("radiance", "dn") else None,
     )
-    columns = tuple(dict.fromkeys(column for name in names for column in channels_behind(name)))
+    # those that were compared come first, as then: the kernel of that evaluation stands already, and serves all figures
+    needed = [column for name in names for column in channels_behind(name)]
+    if "dolp" in needed:
+        needed = [*(column for column in needed if column != "dolp"), *"IQU"]
+    columns = tuple(dict.fromkeys((*compared_channels(report.result.data.channels), *needed)))
     values = predict(report.result.space, report.result.unknowns, along, columns)
+    if "dolp" in names:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            values["dolp"] = np.hypot(values["Q"], values["U"]) / values["I"]
     ends = np.cumsum([cut.path_x.size for cut in cuts])[:-1]
     curves = {}
     for name in names:
