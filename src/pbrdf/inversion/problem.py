@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -142,7 +143,12 @@ class Space:
 
 
 def residuals(
-    space: Space, data: Sequence[Observations], starts: int = 1, accuracy: str | None = None
+    space: Space,
+    data: Sequence[Observations],
+    starts: int = 1,
+    accuracy: str | None = None,
+    *,
+    single: bool = False,
 ) -> Residuals:
     """Weighted residuals (model − measured)/std of several data sets of the same form.
 
@@ -162,6 +168,8 @@ def residuals(
         Number of lanes for each data set.
     accuracy
         Accuracy of the model, if not that of the space's options.
+    single
+        Whether in single precision.
 
     Raises
     ------
@@ -177,9 +185,9 @@ def residuals(
         if other.illumination != first.illumination:
             raise FitError("data sets fitted together must have the same illumination")
     backend = get_backend()
-    Float, UInt32 = backend.Float, backend.UInt32
+    Float, UInt32 = backend.Float32 if single else backend.Float, backend.UInt32
     points = first.values.shape[1]
-    signals = _Signals(space, data, accuracy)
+    signals = _Signals(space, data, accuracy, Float)
     factors = None
     if any(o.correlation is not None for o in data):
         size = len(first.channels)
@@ -219,7 +227,8 @@ def residuals(
 
     # grazing geometries take more work: side by side with their like
     order = np.argsort(np.maximum(first.theta_i, first.theta_r), kind="stable")
-    return Residuals(function, points, _penalty(space), space.loss, order)
+    rough = None if single else partial(residuals, space, data, starts, accuracy, single=True)
+    return Residuals(function, points, _penalty(space), space.loss, order, rough)
 
 
 def predict(
@@ -249,7 +258,9 @@ def predict(
     size = len(data.theta_i)
     point = dr.arange(backend.UInt32, size)
     u = [dr.opaque(backend.Float, float(v), size) for v in unknowns]
-    values, _ = _Signals(space, [data], None)(u, dr.zeros(backend.UInt32, size), point, channels)
+    values, _ = _Signals(space, [data], None, backend.Float)(
+        u, dr.zeros(backend.UInt32, size), point, channels
+    )
     arrays = [backend.Float(v) + dr.zeros(backend.Float, size) for v in values]
     dr.eval(arrays)
     return {name: array.numpy() for name, array in zip(channels, arrays, strict=True)}
@@ -280,9 +291,10 @@ def derivatives(
 
     unknowns = np.asarray(unknowns, dtype=float)
     batch, size = len(unknowns), len(data.theta_i)
-    UInt32 = get_backend().UInt32
+    backend = get_backend()
+    UInt32 = backend.UInt32
     count = dr.opaque(UInt32, size)
-    signals = _Signals(space, [data], None)
+    signals = _Signals(space, [data], None, backend.Float)
 
     def function(u: list[Any], lane: Any, point: Any) -> tuple[list[Any], Any]:
         # a lane for each geometry of each set of unknowns
@@ -296,11 +308,11 @@ def derivatives(
 class _Signals:
     """Channels modelled at one point of one data set, over Dr.Jit floats."""
 
-    def __init__(self, space: Space, data: Sequence[Observations], accuracy: str | None) -> None:
+    def __init__(self, space: Space, data: Sequence[Observations], accuracy: str | None, Float: Any) -> None:
         import drjit as dr
 
         backend = get_backend()
-        self.Float, self.UInt32 = backend.Float, backend.UInt32
+        self.Float, self.UInt32 = Float, backend.UInt32
         self.space, self.incident = space, data[0].illumination
         model = space.build(space.lower)  # only its kernel and options are used
         self.model = model if accuracy is None else model.with_accuracy(accuracy)
