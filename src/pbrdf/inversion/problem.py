@@ -196,12 +196,9 @@ def residuals(
             for i in range(size)
             for j in range(i + 1)
         }
+    values, std = (np.stack([getattr(o, what) for o in data], axis=1) for what in ("values", "std"))
     measured, weights = (
-        [
-            backend.upload(Float, np.concatenate([getattr(o, what)[c] for o in data]))
-            for c in range(len(first.channels))
-        ]
-        for what in ("values", "weights")
+        [backend.upload(Float, column.ravel()) for column in columns] for columns in (values, 1.0 / std)
     )
     divisor = dr.opaque(UInt32, starts)
     stride = dr.opaque(UInt32, points)
@@ -321,7 +318,12 @@ class _Signals:
         first = data[0]
         size = len(first.theta_i)
         names = ("theta_i", "theta_r", "phi")
-        same = all(np.array_equal(getattr(o, n), getattr(first, n)) for o in data[1:] for n in names)
+
+        def is_first(o: Observations, name: str) -> bool:
+            own, other = getattr(o, name), getattr(first, name)
+            return own is other or np.array_equal(own, other)
+
+        same = all(is_first(o, name) for o in data[1:] for name in names)
         self.stride = dr.opaque(self.UInt32, 0 if same else size)
 
         def upload(column: str) -> Any:

@@ -31,16 +31,18 @@ __all__ = ["LOSSES", "Residuals", "Solution", "Status", "linearise", "solve"]
 
 #: Iterations of one kernel launch, after which stopped lanes leave the batch. A batch of at most SMALL_BATCH
 #: lanes runs for as many as make LAUNCH evaluations: recording the kernel anew would take longer than idle lanes do.
-ROUNDS, SMALL_BATCH, LAUNCH = 6, 1024, 1 << 18
+ROUNDS, SMALL_BATCH, LAUNCH = 10, 1024, 1 << 18
 #: Up to SMALL_BATCH lanes that make more than SLICE evaluations in an iteration are wide: SLICE evaluations a launch
 #: (about half a second of one core), shared by about WIDTH lanes.
 SLICE, WIDTH = 1 << 15, 2048
 
 #: How often a step is solved again with the unknowns that would cross a bound held on it.
 BOUND_PASSES = 2
-#: From so many evaluations in an iteration on, a batch is searched in single precision first, which takes a third of the
-#: time; a kernel more has to be compiled, which fewer would not bring in.
+#: From so many evaluations in an iteration on, a batch is searched in single precision first, which takes a third of
+#: the time; a kernel more has to be compiled, which fewer would not bring in.
 WORTH_SINGLE = 1 << 16
+#: The last of that batch, one in so many, go on in double precision as they are.
+FEW = 64
 #: Marquardt's damping at the start, and where the minimum is near.
 DAMPING, DAMPING_NEAR = 1e-3, 1e-6
 
@@ -50,9 +52,9 @@ NO_INFLUENCE = 1e-10
 CREEPING, PATIENCE, PATIENCE_SINGLE = 1e-8, 12, 3
 #: A step that promises no more than this part of the cost is the last: it is taken unseen. With χ² about 100 it is some
 #: 5e-5 standard errors long, and what it leaves is as small against it as it is against the one before. Where single
-#: precision has come near the minimum, the step is damped less and so leaves less; in single precision itself, a shorter
-#: one would not stand out of rounding.
-LAST_STEP, LAST_STEP_NEAR, LAST_STEP_SINGLE = 1e-11, 1e-10, 1e-7
+#: precision has come near the minimum, the step is damped less and so leaves less; in single precision itself, a
+#: shorter one would not stand out of rounding.
+LAST_STEP, LAST_STEP_NEAR, LAST_STEP_SINGLE = 1e-11, 1e-9, 1e-7
 #: A lane that stalled stands at a minimum, but for rounding and kinks, if no more than this part of the cost is left to
 #: gain: with χ² about 100, far less than tells one set of parameters from another.
 NOTHING_TO_GAIN = 1e-6
@@ -233,7 +235,7 @@ def solve(
         )
         # rounding makes lanes stall in single precision that stand at their minimum
         near = rough.converged | (rough.status == Status.STALLED)
-        start = np.where(near[:, None], np.clip(rough.u, lower, upper), start)
+        start = np.where(np.isfinite(rough.cost)[:, None], np.clip(rough.u, lower, upper), start)
         damping, last = np.where(near, DAMPING_NEAR, DAMPING), np.where(near, LAST_STEP_NEAR, LAST_STEP)
         tried, progress = rough.iterations, None
     solution = _solve(residuals, start, lower, upper, damping, last, max_iterations, tolerance, progress)
@@ -268,7 +270,8 @@ def _solve(
     state = _State.initial(backend, Float, *(values[lanes] for values in begin))
     limit = dr.opaque(UInt32, max_iterations)
     small = dr.opaque(Float, tolerance)
-    while len(lanes):
+    few = batch // FEW if single else 0
+    while len(lanes) > few:
         active = backend.upload(UInt32, lanes)
         wide = len(lanes) <= SMALL_BATCH and len(lanes) * residuals.points > SLICE
         state = (_wide_iteration if wide else _iterations)(residuals, state, active, small, limit)
@@ -284,6 +287,8 @@ def _solve(
                 state = state.gather(backend.upload(UInt32, rest))
         if progress is not None:
             progress(max(batch - len(lanes), 0), batch)
+    if len(lanes):
+        result.store(lanes, np.arange(len(lanes)), state, state.status.numpy())
     return result.solution()
 
 
