@@ -61,8 +61,8 @@ class Backend:
     ----------
     name
         ``"llvm"`` or ``"cuda"``.
-    Float, UInt32, Bool
-        Differentiable Dr.Jit array types: float64, uint32 and mask.
+    Float, Float32, UInt32, Bool
+        Differentiable Dr.Jit array types: float64, float32, uint32 and mask.
     module
         The Dr.Jit module that holds them, ``drjit.llvm.ad`` or ``drjit.cuda.ad``.
     """
@@ -73,6 +73,10 @@ class Backend:
     @property
     def Float(self) -> Any:
         return self.module.Float64
+
+    @property
+    def Float32(self) -> Any:
+        return self.module.Float
 
     @property
     def UInt32(self) -> Any:

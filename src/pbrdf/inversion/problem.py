@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -168,7 +168,12 @@ class Space:
 
 
 def residuals(
-    space: Space, data: Sequence[Observations], starts: int = 1, accuracy: str | None = None
+    space: Space,
+    data: Sequence[Observations],
+    starts: int = 1,
+    accuracy: str | None = None,
+    *,
+    single: bool = False,
 ) -> Residuals | BlockResiduals:
     """Weighted residuals (model − measured)/std of several data sets of the same form.
 
@@ -188,6 +193,8 @@ def residuals(
         Number of lanes for each data set.
     accuracy
         Accuracy of the model, if not that of the space's options.
+    single
+        Whether in single precision.
 
     Raises
     ------
@@ -203,9 +210,9 @@ def residuals(
         if other.illumination != first.illumination:
             raise FitError("data sets fitted together must have the same illumination")
     backend = get_backend()
-    Float, UInt32 = backend.Float, backend.UInt32
+    Float, UInt32 = backend.Float32 if single else backend.Float, backend.UInt32
     points = first.values.shape[1]
-    signals = _Signals(space.of_a_block, data, accuracy)
+    signals = _Signals(space.of_a_block, data, accuracy, Float)
     factors = None
     if any(o.correlation is not None for o in data):
         size = len(first.channels)
@@ -242,7 +249,8 @@ def residuals(
     # grazing geometries take more work: side by side with their like
     order = np.argsort(np.maximum(first.theta_i, first.theta_r), kind="stable")
     if space.blocks is None:
-        return Residuals(function, points, _penalty(space), space.loss, order)
+        rough = None if single else partial(residuals, space, data, starts, accuracy, single=True)
+        return Residuals(function, points, _penalty(space), space.loss, order, rough)
     place = space.blocks.places(getattr(first, space.blocks.split))
     blocks = len(space.blocks.labels)
     if (place == blocks).any():
@@ -287,7 +295,8 @@ def predict(
     else:
         counting, _ = _at_points(space, np.asarray(unknowns, dtype=float)[None], data)
         u = [backend.upload(backend.Float, column) for column in counting[0].T]
-    values, _ = _Signals(space.of_a_block, [data], None)(u, dr.zeros(backend.UInt32, size), point, channels)
+    signals = _Signals(space.of_a_block, [data], None, backend.Float)
+    values, _ = signals(u, dr.zeros(backend.UInt32, size), point, channels)
     arrays = [backend.Float(v) + dr.zeros(backend.Float, size) for v in values]
     dr.eval(arrays)
     return {name: array.numpy() for name, array in zip(channels, arrays, strict=True)}
@@ -318,9 +327,10 @@ def derivatives(
 
     unknowns = np.asarray(unknowns, dtype=float)
     batch, size = len(unknowns), len(data.theta_i)
-    UInt32 = get_backend().UInt32
+    backend = get_backend()
+    UInt32 = backend.UInt32
     count = dr.opaque(UInt32, size)
-    signals = _Signals(space.of_a_block, [data], None)
+    signals = _Signals(space.of_a_block, [data], None, backend.Float)
     counting, place = _at_points(space, unknowns, data)
 
     def function(u: list[Any], lane: Any, point: Any) -> tuple[list[Any], Any]:
@@ -347,11 +357,11 @@ def _at_points(space: Space, unknowns: np.ndarray, data: Observations) -> tuple[
 class _Signals:
     """Channels modelled at one point of one data set, over Dr.Jit floats."""
 
-    def __init__(self, space: Space, data: Sequence[Observations], accuracy: str | None) -> None:
+    def __init__(self, space: Space, data: Sequence[Observations], accuracy: str | None, Float: Any) -> None:
         import drjit as dr
 
         backend = get_backend()
-        self.Float, self.UInt32 = backend.Float, backend.UInt32
+        self.Float, self.UInt32 = Float, backend.UInt32
         self.space, self.incident = space, data[0].illumination
         model = space.build(space.lower)  # only its kernel and options are used
         self.model = model if accuracy is None else model.with_accuracy(accuracy)
@@ -360,7 +370,12 @@ class _Signals:
         first = data[0]
         size = len(first.theta_i)
         names = ("theta_i", "theta_r", "phi")
-        same = all(np.array_equal(getattr(o, n), getattr(first, n)) for o in data[1:] for n in names)
+
+        def is_first(o: Observations, name: str) -> bool:
+            own, other = getattr(o, name), getattr(first, name)
+            return own is other or np.array_equal(own, other)
+
+        same = all(is_first(o, name) for o in data[1:] for name in names)
         self.stride = dr.opaque(self.UInt32, 0 if same else size)
 
         def upload(column: str) -> Any:

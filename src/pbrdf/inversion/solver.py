@@ -31,17 +31,30 @@ __all__ = ["LOSSES", "Residuals", "Solution", "Status", "linearise", "solve"]
 
 #: Iterations of one kernel launch, after which stopped lanes leave the batch. A batch of at most SMALL_BATCH
 #: lanes runs for as many as make LAUNCH evaluations: recording the kernel anew would take longer than idle lanes do.
-ROUNDS, SMALL_BATCH, LAUNCH = 6, 1024, 1 << 18
+ROUNDS, SMALL_BATCH, LAUNCH = 10, 1024, 1 << 18
 #: Up to SMALL_BATCH lanes that make more than SLICE evaluations in an iteration are wide: SLICE evaluations a launch
 #: (about half a second of one core), shared by about WIDTH lanes.
 SLICE, WIDTH = 1 << 15, 2048
 
 #: How often a step is solved again with the unknowns that would cross a bound held on it.
 BOUND_PASSES = 2
+#: From so many evaluations in an iteration on, a batch is searched in single precision first, which takes a third of
+#: the time; a kernel more has to be compiled, which fewer would not bring in.
+WORTH_SINGLE = 1 << 16
+#: The last of that batch, one in so many, go on in double precision as they are.
+FEW = 64
+#: Marquardt's damping at the start, and where the minimum is near.
+DAMPING, DAMPING_NEAR = 1e-3, 1e-6
+
 #: An unknown whose whole range changes the residuals by less than this part of them has no influence but rounding's.
 NO_INFLUENCE = 1e-10
 #: A lane stalls that gains no more than this part of the cost in so many steps: kinks of a model make it creep.
-CREEPING, PATIENCE = 1e-8, 12
+CREEPING, PATIENCE, PATIENCE_SINGLE = 1e-8, 12, 3
+#: A step that promises no more than this part of the cost is the last: it is taken unseen. With χ² about 100 it is some
+#: 5e-5 standard errors long, and what it leaves is as small against it as it is against the one before. Where single
+#: precision has come near the minimum, the step is damped less and so leaves less; in single precision itself, a
+#: shorter one would not stand out of rounding.
+LAST_STEP, LAST_STEP_NEAR, LAST_STEP_SINGLE = 1e-11, 1e-9, 1e-7
 #: A lane that stalled stands at a minimum, but for rounding and kinks, if no more than this part of the cost is left to
 #: gain: with χ² about 100, far less than tells one set of parameters from another.
 NOTHING_TO_GAIN = 1e-6
@@ -118,6 +131,8 @@ class Residuals:
     order
         The points such that neighbours take the same branches, shape (points,): neighbours are computed side by side
         where lanes share out their points. None for as they are.
+    single
+        Makes the same residuals over float32, for the search of large batches; None where there are none.
     """
 
     function: Function
@@ -125,6 +140,7 @@ class Residuals:
     penalty: Callable[[list[Any]], list[tuple[int, Any, Any]]] | None = None
     loss: str = "linear"
     order: np.ndarray | None = None
+    single: Callable[[], Residuals] | None = None
 
 
 @dataclass(frozen=True)
@@ -200,19 +216,62 @@ def solve(
     Solution
         With whatever was reached; look at ``status``.
     """
+    lower, upper = (np.broadcast_to(np.asarray(b, dtype=float), start.shape) for b in (lower, upper))
+    start = np.clip(start, lower, upper)
+    damping, last = (np.full(len(start), value) for value in (DAMPING, LAST_STEP))
+    tried = np.zeros(len(start), dtype=int)
+    if residuals.single is not None and len(start) * residuals.points >= WORTH_SINGLE:
+        rough = _solve(
+            residuals.single(),
+            start,
+            lower,
+            upper,
+            damping,
+            np.full(len(start), LAST_STEP_SINGLE),
+            max_iterations,
+            tolerance,
+            progress,
+            single=True,
+        )
+        # rounding makes lanes stall in single precision that stand at their minimum
+        near = rough.converged | (rough.status == Status.STALLED)
+        start = np.where(np.isfinite(rough.cost)[:, None], np.clip(rough.u, lower, upper), start)
+        damping, last = np.where(near, DAMPING_NEAR, DAMPING), np.where(near, LAST_STEP_NEAR, LAST_STEP)
+        tried, progress = rough.iterations, None
+    solution = _solve(residuals, start, lower, upper, damping, last, max_iterations, tolerance, progress)
+    solution.iterations[:] += tried
+    solution.status[nothing_to_gain(solution, lower, upper)] = Status.SMALL_REDUCTION
+    return solution
+
+
+def _solve(
+    residuals: Residuals,
+    start: np.ndarray,
+    lower: np.ndarray,
+    upper: np.ndarray,
+    damping: np.ndarray,
+    last: np.ndarray,
+    max_iterations: int,
+    tolerance: float,
+    progress: Callable[[int, int], None] | None,
+    *,
+    single: bool = False,
+) -> Solution:
+    """:func:`solve` in one precision, from starts within the bounds; a first damping and last step of each."""
     import drjit as dr
 
     backend = get_backend()
-    Float, UInt32 = backend.Float, backend.UInt32
+    Float, UInt32 = backend.Float32 if single else backend.Float, backend.UInt32
     batch, size = start.shape
-    lower, upper = (np.broadcast_to(np.asarray(b, dtype=float), start.shape) for b in (lower, upper))
     result = _Result(batch, size)
     # a batch of one would be compiled apart, as a broadcast: double it
     lanes = np.arange(batch, dtype=np.uint32) if batch > 1 else np.zeros(2, dtype=np.uint32)
-    state = _State.initial(backend, np.clip(start, lower, upper)[lanes], lower[lanes], upper[lanes])
+    begin = (start, lower, upper, damping, last)
+    state = _State.initial(backend, Float, *(values[lanes] for values in begin))
     limit = dr.opaque(UInt32, max_iterations)
     small = dr.opaque(Float, tolerance)
-    while len(lanes):
+    few = batch // FEW if single else 0
+    while len(lanes) > few:
         active = backend.upload(UInt32, lanes)
         wide = len(lanes) <= SMALL_BATCH and len(lanes) * residuals.points > SLICE
         state = (_wide_iteration if wide else _iterations)(residuals, state, active, small, limit)
@@ -228,9 +287,9 @@ def solve(
                 state = state.gather(backend.upload(UInt32, rest))
         if progress is not None:
             progress(max(batch - len(lanes), 0), batch)
-    solution = result.solution()
-    solution.status[nothing_to_gain(solution, lower, upper)] = Status.SMALL_REDUCTION
-    return solution
+    if len(lanes):
+        result.store(lanes, np.arange(len(lanes)), state, state.status.numpy())
+    return result.solution()
 
 
 def linearise(function: Function, u: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:
@@ -295,13 +354,22 @@ class _State:
     status: Any
     iterations: Any
     slow: Any
+    last: Any
 
     @classmethod
-    def initial(cls, backend: Any, start: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> _State:
+    def initial(
+        cls,
+        backend: Any,
+        Float: Any,
+        start: np.ndarray,
+        lower: np.ndarray,
+        upper: np.ndarray,
+        damping: np.ndarray,
+        last: np.ndarray,
+    ) -> _State:
         # infinite cost and an identity for JᵀJ: the first "step" has length 0 and is always accepted
         import drjit as dr
 
-        Float = backend.Float
         batch, size = start.shape
 
         def full(value: float) -> Any:
@@ -317,11 +385,12 @@ class _State:
             cost=full(np.inf),
             A=[full(1.0 if i == j else 0.0) for i in range(size) for j in range(i + 1)],
             g=[full(0.0) for _ in range(size)],
-            damping=full(1e-3),
+            damping=backend.upload(Float, damping),
             growth=full(2.0),
             status=dr.opaque(backend.UInt32, 0, batch),
             iterations=dr.opaque(backend.UInt32, 0, batch),
             slow=dr.opaque(backend.UInt32, 0, batch),
+            last=backend.upload(Float, last),
         )
 
     def gather(self, index: Any) -> _State:
@@ -445,17 +514,17 @@ def _arrived(state: _State, trial: list[Any], predicted: Any, tolerance: Any) ->
     u, g, size, low, high = state.u, state.g, len(state.u), state.low, state.high
     A = _unpack(state.A, size)
     Float, U = type(predicted), type(state.status)
+    tiny = _tiny(Float)
     length = dr.zeros(Float, 1)
     slope2 = dr.zeros(Float, 1)  # largest squared cosine between the residuals and a column of J
     leaving = _leaving(g, u, low, high)
     for i in range(size):
-        length = dr.maximum(length, dr.abs(trial[i] - u[i]) / dr.maximum(high[i] - low[i], 1e-300))
-        cosine2 = g[i] * g[i] / dr.maximum(2.0 * A[i][i] * state.cost, 1e-300)
+        length = dr.maximum(length, dr.abs(trial[i] - u[i]) / dr.maximum(high[i] - low[i], tiny))
+        cosine2 = g[i] * g[i] / dr.maximum(2.0 * A[i][i] * state.cost, tiny)
         slope2 = dr.maximum(slope2, dr.select(leaving[i], 0.0, cosine2))
     # a step is small because the minimum is near only if damping has not made it so
     free = state.damping <= 1.0
-    # below some 1e-15 of the cost a reduction cannot be told from rounding
-    small = (predicted >= 0.0) & (predicted <= dr.maximum(tolerance * tolerance, 4e-15) * state.cost)
+    small = (predicted >= 0.0) & (predicted <= dr.maximum(tolerance * tolerance, state.last) * state.cost)
     status = dr.select(free & small, U(int(Status.SMALL_REDUCTION)), U(int(Status.RUNNING)))
     status = dr.select(free & (length < tolerance), U(int(Status.SMALL_STEP)), status)
     status = dr.select(slope2 <= tolerance * tolerance, U(int(Status.ZERO_GRADIENT)), status)
@@ -479,7 +548,7 @@ def _judge(
     first = ~dr.isfinite(state.cost)
     finite = dr.isfinite(cost)
     accepted = going & finite & (((cost < state.cost) & (predicted > 0.0)) | first)
-    gain = dr.select(first, 1.0, (state.cost - cost) / dr.maximum(predicted, 1e-300))
+    gain = dr.select(first, 1.0, (state.cost - cost) / dr.maximum(predicted, _tiny(type(cost))))
     factor = dr.clip(1.0 - (2.0 * gain - 1.0) ** 3, 1.0 / 5.0, 2.0)
     damping = dr.select(
         accepted,
@@ -489,8 +558,9 @@ def _judge(
     growth = dr.select(accepted, 2.0, dr.minimum(2.0 * state.growth, 64.0))
 
     U = type(state.status)
+    patience = PATIENCE_SINGLE if _is_single(type(cost)) else PATIENCE
     slow = dr.select(state.cost - cost > CREEPING * state.cost, U(0), state.slow + 1)
-    status = dr.select((state.damping > 1e12) | (slow >= PATIENCE), U(int(Status.STALLED)), U(0))
+    status = dr.select((state.damping > 1e12) | (slow >= patience), U(int(Status.STALLED)), U(0))
     status = dr.select(going, status, arrived)
     status = dr.select((status == 0) & (state.iterations >= limit), U(int(Status.ITERATIONS)), status)
     # where every unknown is held there is nothing to try
@@ -503,19 +573,37 @@ def _judge(
     def keep(new: list[Any], old: list[Any]) -> list[Any]:
         return [dr.select(accepted, a, b) for a, b in zip(new, old, strict=True)]
 
+    # the last step is so short that its end need not be looked at
+    last = ((arrived == int(Status.SMALL_REDUCTION)) | (arrived == int(Status.SMALL_STEP))) & (
+        predicted > 0.0
+    )
     return _State(
-        u=keep(trial, state.u),
+        u=[dr.select(accepted | last, a, b) for a, b in zip(trial, state.u, strict=True)],
         low=state.low,
         high=state.high,
-        cost=dr.select(accepted, cost, state.cost),
+        cost=dr.select(accepted, cost, dr.select(last, state.cost - predicted, state.cost)),
         A=keep(packed, state.A),
-        g=keep(gradient, state.g),
+        g=[
+            dr.select(last, after, x)
+            for after, x in zip(_gradient_after(state, trial), keep(gradient, state.g), strict=True)
+        ],
         damping=damping,
         growth=growth,
         status=status,
         iterations=dr.select(going, state.iterations + 1, state.iterations),
         slow=dr.select(first, U(0), slow),
+        last=state.last,
     )
+
+
+def _gradient_after(state: _State, trial: list[Any]) -> list[Any]:
+    """Gradient of the quadratic model after a step."""
+    A = _unpack(state.A, len(trial))
+    delta = [a - b for a, b in zip(trial, state.u, strict=True)]
+    return [
+        state.g[i] + sum(A[max(i, j)][min(i, j)] * delta[j] for j in range(len(delta)))
+        for i in range(len(delta))
+    ]
 
 
 def _wide_normal_equations(
@@ -638,6 +726,17 @@ def _jacobian(function: Function, u: list[Any], lane: Any, point: Any) -> tuple[
     return [dr.detach(x) for x in r], J
 
 
+def _is_single(Float: Any) -> bool:
+    import drjit as dr
+
+    return bool(dr.type_v(Float) == dr.VarType.Float32)
+
+
+def _tiny(Float: Any) -> float:
+    """What a divisor is at least."""
+    return 1e-30 if _is_single(Float) else 1e-300
+
+
 def _inner(a: Sequence[Any], b: Sequence[Any]) -> Any:
     import drjit as dr
 
@@ -690,8 +789,9 @@ def _damped_step(
 
     size = len(g)
     # scale to a unit diagonal first: unknowns without influence get a unit row and no step
+    tiny = _tiny(type(g[0]))
     scale = [
-        dr.select(held[i] | (A[i][i] <= 0.0), 0.0, dr.rsqrt(dr.maximum(A[i][i], 1e-300))) for i in range(size)
+        dr.select(held[i] | (A[i][i] <= 0.0), 0.0, dr.rsqrt(dr.maximum(A[i][i], tiny))) for i in range(size)
     ]
     L: list[list[Any]] = [[None] * (i + 1) for i in range(size)]
     inverse: list[Any] = [None] * size
@@ -701,7 +801,7 @@ def _damped_step(
             for q in range(j):
                 value = value - L[i][q] * L[j][q]
             if i == j:
-                inverse[i] = dr.rsqrt(dr.maximum(value, 1e-14))
+                inverse[i] = dr.rsqrt(dr.maximum(value, 1e-6 if _is_single(type(value)) else 1e-14))
             else:
                 L[i][j] = value * inverse[j]
     y: list[Any] = []

@@ -71,7 +71,7 @@ def joint(
     """Search from all starts with the draft accuracy, then refine each distinct end with the model's own.
 
     Every start gets the refined end of its cluster. Many geometries are searched in part
-    (:mod:`pbrdf.inversion.thinning`), and the best ends then refined on all; χ² of the others is that of the part.
+    (:mod:`pbrdf.inversion.thinning`), and the best ends then refined on all; χ² of the others is that of the search.
 
     Parameters
     ----------
@@ -89,18 +89,19 @@ def joint(
     """
     low, high = space.box
     part = thinned(space, data)
-    if part is not None:
-        found, (stage,) = joint(space, part, first, max_iterations, progress)
-        solution = _on_all(space, data, part, found, low, high, max_iterations, progress)
-        return solution, [replace(stage, name="search"), _stage("joint", space, solution, space.names, data)]
-    problem = residuals(space, [data], len(first), accuracy="draft")
+    problem = residuals(space, [data if part is None else part], len(first), accuracy="draft")
     search = solve(
         problem, first, low, high, max_iterations=max_iterations, tolerance=1e-6, progress=progress
     )
     if isinstance(problem, BlockResiduals):
         search = recombined(problem, search, low, high, max_iterations=max_iterations, tolerance=1e-6)
-    solution = _refine(space, data, search, low, high, max_iterations)
-    return solution, [_stage("joint", space, solution, space.names, data)]
+    if part is not None:
+        solution = _on_all(space, data, part, search, low, high, max_iterations, progress)
+        stages = [_stage("search", space, search, space.names, part)]
+    else:
+        solution = _refine(space, data, search, low, high, max_iterations)
+        stages = []
+    return solution, [*stages, _stage("joint", space, solution, space.names, data)]
 
 
 def stepwise(
