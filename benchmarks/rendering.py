@@ -147,13 +147,13 @@ def show(console: Console, result: dict[str, Any]) -> None:
         ("÷ pplastic", 11),
         ("cpu ÷", 8),
         ("first s", 8),
-        ("aim", 23),
+        ("aim", 14),
     ):
         table.add_column(column, justify="right", no_wrap=True, width=width)
     for name in MATERIALS:
         aim = {
             "pbrdf": f"≤ {TARGET:g}x {'met' if result['met'] else 'missed'}",
-            "pbrdf, visible": f"{result['visible_ratio']:.2f} of ≤ {VISIBLE_TARGET:g} × pbrdf",
+            "pbrdf, visible": f"{result['visible_ratio']:.1f} ≤ {VISIBLE_TARGET:g} pbrdf",
         }.get(name, "")
         table.add_row(
             name,

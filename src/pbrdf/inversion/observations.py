@@ -204,6 +204,9 @@ class Observations:
 
         In the rows and columns of channels that were not measured it is the identity.
         """
+        return self._cholesky()
+
+    def _cholesky(self) -> np.ndarray:
         size = len(self.channels)
         measured = np.isfinite(self.std).T
         if self.correlation is None:
@@ -216,9 +219,10 @@ class Observations:
 
         W times the residuals are independent with variance 1; 0 where nothing was measured.
         """
-        return np.ascontiguousarray(
-            (np.linalg.inv(self.factor) * self.weights.T[:, None, :]).transpose(1, 2, 0)
-        )
+        # of many geometries large: only what is returned stays
+        matrices = np.linalg.inv(self._cholesky())
+        matrices *= self.weights.T[:, None, :]
+        return np.ascontiguousarray(matrices.transpose(1, 2, 0))
 
     @property
     def _measured_correlation(self) -> np.ndarray:
