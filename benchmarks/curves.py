@@ -26,7 +26,9 @@ from typing import Any
 
 import numpy as np
 from evaluation import PAINT, processor, random_geometries
+from matplotlib import rc_context
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
 from rich.console import Console
 
 import pbrdf
@@ -138,10 +140,14 @@ def draw(seconds: dict[str, dict[str, dict[int, list[float]]]]) -> Figure:
                 label=curve,
             )
         if panel != "directions":
-            # through the last point of the last curve
-            ax.plot(x, middle[-1] * x / x[-1], ":", color="0.5", label="proportional")
+            # through a point in the middle of the last curve
+            centre = x.size // 2
+            ax.plot(x, middle[centre] * x / x[centre], ":", color="0.5", label="proportional")
         ax.set(xscale="log", yscale="log", xlabel=f"number of {panel}")
         ax.set_ylabel("time of a direction (ns)" if panel == "directions" else "time of a fit (ms)")
+        ax.xaxis.set_minor_formatter(NullFormatter())
+        if panel == "free parameters":
+            ax.set_xticks([1, 2, 3, 4, 6, 10, 18, 34], labels=["1", "2", "3", "4", "6", "10", "18", "34"])
         ax.grid(True, which="major", color="0.9")
         ax.legend(frameon=False, fontsize=8)
     return figure
@@ -174,7 +180,8 @@ def main() -> int:
     figure = draw(seconds)
     figure.suptitle(f"{machine['processor']}, {machine['cores']} cores, {machine['backend']}", fontsize=9)
     picture = options.output / f"curves.{options.format}"
-    figure.savefig(picture, dpi=120, metadata={"Date": None} if options.format == "svg" else None)
+    with rc_context({"svg.fonttype": "none", "svg.hashsalt": "pbrdf"}):
+        figure.savefig(picture, dpi=90, metadata={"Date": None} if options.format == "svg" else None)
     told = json.dumps({"machine": machine, "seconds": seconds}, indent=1, ensure_ascii=False)
     (options.output / "curves.json").write_text(told + "\n", encoding="utf-8")
     Console().print(f"written: {picture}, {options.output / 'curves.json'}", highlight=False)
