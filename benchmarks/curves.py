@@ -98,7 +98,7 @@ def fits(quick: bool) -> dict[str, Measured]:
 def times(
     panels: dict[str, Measured], rounds: int, longest: float
 ) -> dict[str, dict[str, dict[int, list[float]]]]:
-    """Seconds of every call in every round; a call that takes longer than ``longest`` seconds is made once."""
+    """Seconds of every call in every round; a call that takes longer than ``longest`` seconds counts once."""
     seconds: dict[str, dict[str, dict[int, list[float]]]] = {
         panel: {curve: {size: [] for size in calls} for curve, calls in curves.items()}
         for panel, curves in panels.items()
@@ -113,8 +113,8 @@ def times(
                     start = time.perf_counter()
                     call()
                     taken = time.perf_counter() - start
-                    # the first round compiles; long calls hardly feel it
-                    if round_ >= 0 or taken > longest:
+                    # the first round compiles
+                    if round_ >= 0:
                         kept.append(taken)
     return seconds
 
