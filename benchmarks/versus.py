@@ -33,7 +33,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -136,6 +136,8 @@ class Worker:
                 stdout=subprocess.PIPE,
                 stderr=self.log,
                 env=environment,
+                # of a group of its own, so that what it started ends with it
+                start_new_session=True,
             )
             return self.ask(STARTING, do="versions")
         return {}
@@ -168,7 +170,8 @@ class Worker:
     def stop(self) -> None:
         """End the process and what it started."""
         if self.process is not None:
-            self.process.kill()
+            with suppress(ProcessLookupError):
+                os.killpg(self.process.pid, signal.SIGKILL)
             self.process.wait()
             for pipe in (self.process.stdin, self.process.stdout):
                 if pipe:
@@ -392,6 +395,8 @@ def main() -> int:
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
     console = Console(width=None if sys.stdout.isatty() else 150)
     reports: list[dict[str, Any]] = []
+    machine: dict[str, Any] = {}
+    interrupted = False
     try:
         commit = git("rev-parse", "--short", f"{options.revision}^{{commit}}")
         with tempfile.TemporaryDirectory(prefix="pbrdf-versus-") as folder:
@@ -426,8 +431,7 @@ def main() -> int:
         return 1
     except KeyboardInterrupt:
         console.print("interrupted; what was measured:")
-        used = {}
-        machine = {}
+        interrupted, used = True, {}
     judge(reports)
     if reports:
         console.print(table_of(reports), highlight=False)
@@ -452,7 +456,7 @@ def main() -> int:
     ]
     if wrong:
         console.print(f"[red]Failed, or the builds disagree: {'; '.join(wrong)}[/red]")
-    return 1 if wrong else 0
+    return 130 if interrupted else 1 if wrong else 0
 
 
 if __name__ == "__main__":

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import drjit as dr
+import numpy as np
 import pytest
 
 import pbrdf
@@ -283,3 +284,13 @@ class TestDrJitImportedBefore:
         )
         run = python(code, DRJIT_LIBLLVM_PATH="/nonexistent")
         assert run.stdout.split() == ["False", "True"], run.stderr
+
+
+@pytest.mark.parametrize("name", ["llvm", "cuda"])
+def test_what_is_uploaded_may_be_a_view(name):
+    """Columns, reversed and broadcast arrays and integers arrive as they are, by the way of either backend."""
+    found = backend.Backend(name, backend.get_backend().module)
+    table = np.arange(12.0).reshape(4, 3)
+    for values in (table[:, 1], table[::-1, 0], np.broadcast_to(2.0, (4,)), np.empty(0)):
+        assert found.upload(found.Float, values).numpy() == pytest.approx(values)
+    assert found.upload(found.UInt32, np.flatnonzero(table[:, 0] > 3)).numpy().tolist() == [2, 3]
