@@ -98,7 +98,7 @@ def solve_blocks(
     u = np.clip(start, lower, upper)
     with np.errstate(all="ignore"):
         cost, system = evaluate(u, lanes)
-        walk = _Walk.initial(cost, (upper > lower).any(axis=1))
+        walk = _Walk.initial(cost, np.any(upper > lower, axis=1))
         while True:
             going = walk.status == Status.RUNNING
             if not going.all():
@@ -142,13 +142,15 @@ def recombined(
     """Ends of many starts of one data set, the best one bettered by what others found for single blocks.
 
     That one start finds the right optimum for every block is the less likely the more blocks there are; that some start
-    does for each is not. With the shared unknowns of the best end, each block takes its own from the start whose suit
-    it best, and all are fitted again from there.
+    does for each is not. With the shared unknowns of the best end, each block takes those own unknowns of any end that
+    suit it best, and all are fitted again from there.
 
     Parameters
     ----------
-    problem, lower, upper, max_iterations, tolerance
+    problem, max_iterations, tolerance
         As of :func:`solve_blocks`, of which ``found`` is the result.
+    lower, upper
+        Bounds, shape (P,).
 
     Returns
     -------

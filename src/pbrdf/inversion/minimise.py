@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -24,7 +25,7 @@ def solve(
     progress: Callable[[int, int], None] | None = None,
 ) -> Solution:
     """Minimise within bounds; parameters and result as of :func:`pbrdf.inversion.solver.solve`."""
-    options = {"max_iterations": max_iterations, "tolerance": tolerance, "progress": progress}
+    options: dict[str, Any] = {"max_iterations": max_iterations, "tolerance": tolerance, "progress": progress}
     if isinstance(residuals, BlockResiduals):
         return solve_blocks(residuals, start, lower, upper, **options)
     return solve_whole(residuals, start, lower, upper, **options)

@@ -175,10 +175,11 @@ def _linearised(information: np.ndarray, prior: np.ndarray, at_bound: np.ndarray
     """Tangents, shape (P, P), and standard errors, shape (P,), of the unknowns, each profiled by itself."""
     size = len(prior)
     tangent, error = np.zeros((size, size)), np.empty(size)
-    for i in range(size):
-        inside = np.flatnonzero(~at_bound | (np.arange(size) == i))
+    # an unknown on a bound is freed for its own profile only
+    for of in (np.flatnonzero(~at_bound), *np.flatnonzero(at_bound)[:, None]):
+        inside = np.union1d(np.flatnonzero(~at_bound), of)
         cov = covariance(information[np.ix_(inside, inside)], prior[inside])
-        j = int(np.searchsorted(inside, i))
-        tangent[i, inside] = cov[:, j] / cov[j, j]
-        error[i] = math.sqrt(cov[j, j])
+        for i, j in zip(of, np.searchsorted(inside, of), strict=True):
+            tangent[i, inside] = cov[:, j] / cov[j, j]
+            error[i] = math.sqrt(cov[j, j])
     return tangent, error
