@@ -59,4 +59,4 @@ def open_experiment(name: str) -> xr.Dataset:
     """
     file = resources.files("pbrdf.data") / "experiment" / f"{_known(name)}.csv"
     with resources.as_file(file) as path:
-        return read(path)
+        return read(path, format="csv")

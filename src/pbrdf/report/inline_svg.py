@@ -6,13 +6,14 @@ the colours of most curves stay. Identifiers are made unique, so that several fi
 
 from __future__ import annotations
 
-import io
 import re
 from typing import TYPE_CHECKING, Any
 
-from pbrdf.report.style import styled
+from pbrdf.report.style import DOTS_PER_INCH, png, styled
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from markupsafe import Markup
     from matplotlib.figure import Figure
 
@@ -20,9 +21,8 @@ __all__ = ["inline_svg"]
 
 #: Points of a panel from which on they are put in as a picture: the page would become too large.
 _MANY_POINTS = 1500
-_DOTS_PER_INCH = 160
-#: CSS pixels per point, as browsers count.
-_PIXELS_PER_POINT = 4.0 / 3.0
+#: CSS pixels per dot of a figure.
+_PIXELS_PER_DOT = 96.0 / DOTS_PER_INCH
 #: Part of its natural width below which a figure is no longer legible: it scrolls in its box then.
 _LEGIBLE = 0.72
 #: What becomes a colour of the page; dark blue and dark green are hard to see on black.
@@ -36,7 +36,7 @@ _PAGE_COLOURS = {
 _FONTS = "system-ui, 'DejaVu Sans', sans-serif"
 
 
-def inline_svg(figure: Figure, alternative: str, name: str) -> Markup:
+def inline_svg(figure: Figure, alternative: str, name: str, picture: Path | None = None) -> Markup:
     """The figure as an ``svg`` element.
 
     Parameters
@@ -47,17 +47,21 @@ def inline_svg(figure: Figure, alternative: str, name: str) -> Markup:
         What it shows, for those who do not see it.
     name
         Unique within the page; letters, digits and hyphens.
+    picture
+        Where to save the figure as PNG as well, drawn at the same time.
     """
     import matplotlib
     from markupsafe import Markup, escape
 
+    from pbrdf.report.drawing import drawn
+
     for ax in figure.axes:
         _keep_small(ax)
-    drawn = io.StringIO()
     with styled():
         matplotlib.rcParams["svg.fonttype"] = "none"  # text stays text: small, searchable, sharp
-        figure.savefig(drawn, format="svg", metadata={"Date": None}, dpi=_DOTS_PER_INCH, transparent=True)
-    text = drawn.getvalue()
+        pixels, text = drawn(figure, DOTS_PER_INCH)
+    if picture is not None:
+        picture.write_bytes(png(pixels))
     opening = re.search(r"<svg\b[^>]*>", text)
     view = re.search(r'viewBox="0 0 ([\d.]+) ([\d.]+)"', text)
     if opening is None or view is None:
@@ -68,7 +72,7 @@ def inline_svg(figure: Figure, alternative: str, name: str) -> Markup:
     body = body.replace("xlink:href", "href")
     body = re.sub(r'(\bid="|url\(#|href="#)', rf"\g<1>{name}-", body)
     body = _in_colours_of_the_page(body)
-    width, height = (_PIXELS_PER_POINT * float(size) for size in view.groups())
+    width, height = (_PIXELS_PER_DOT * float(size) for size in view.groups())
     return Markup(
         f'<svg role="img" aria-label="{escape(alternative)}" viewBox="0 0 {view[1]} {view[2]}" width="{width:.0f}" '
         f'height="{height:.0f}" style="min-width:{_LEGIBLE * width:.0f}px"><title>{escape(alternative)}</title>'

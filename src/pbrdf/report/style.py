@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 __all__ = [
     "BLUE",
     "DISTINCT_COLOURS",
+    "DOTS_PER_INCH",
     "FIGURE_FORMATS",
     "GREY",
     "RED",
@@ -31,6 +32,7 @@ __all__ = [
     "looks_of",
     "new_figure",
     "panels",
+    "png",
     "save_figure",
     "styled",
 ]
@@ -59,11 +61,12 @@ _RC: dict[str, Any] = {
     "svg.hashsalt": "pbrdf",
     "pdf.fonttype": 42,
 }
-_DOTS_PER_INCH = 140
+#: Resolution of figures.
+DOTS_PER_INCH = 140
 #: Formats that figures are written in, with what Matplotlib is told. No dates, so that the same figure is the same
 #: file.
 FIGURE_FORMATS: dict[str, dict[str, Any]] = {
-    "png": {"dpi": _DOTS_PER_INCH},
+    "png": {"dpi": DOTS_PER_INCH},
     "pdf": {"metadata": {"CreationDate": None}},
     "svg": {"metadata": {"Date": None}},
 }
@@ -178,29 +181,37 @@ def save_figure(figure: Figure, path: Path) -> None:
         raise DataError(f"{path}: figures are written as {', '.join('.' + k for k in FIGURE_FORMATS)}")
     with styled(), atomic_file(path) as target:
         if kind == "png":
-            target.write_bytes(_png(figure))
+            target.write_bytes(png(_pixels(figure)))
         else:
             figure.savefig(target, format=kind, **FIGURE_FORMATS[kind])
 
 
-def _png(figure: Figure) -> bytes:
-    """The figure as PNG: opaque, every row as its difference from the one above.
-
-    Lines and letters on white differ little from row to row, so that the quickest compression makes smaller files of
-    these differences than Pillow does, which looks for the best filter of each row, in a quarter of its time.
-    """
+def _pixels(figure: Figure) -> np.ndarray:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     canvas = FigureCanvasAgg(figure)
     canvas.print_figure(io.BytesIO(), format="rgba", **FIGURE_FORMATS["png"])
-    pixels = np.asarray(canvas.buffer_rgba())[..., :3]
+    return np.asarray(canvas.buffer_rgba())
+
+
+def png(pixels: np.ndarray) -> bytes:
+    """A drawn figure as PNG: opaque, every row as its difference from the one above.
+
+    Lines and letters on white differ little from row to row, so that the quickest compression makes smaller files of
+    these differences than Pillow does, which looks for the best filter of each row, in a quarter of its time.
+
+    Parameters
+    ----------
+    pixels
+        RGBA, shape (height, width, 4), bytes.
+    """
     height, width, _ = pixels.shape
-    flat = pixels.reshape(height, 3 * width)
+    flat = pixels[..., :3].reshape(height, 3 * width)
     rows = np.empty((height, 1 + 3 * width), dtype=np.uint8)
     rows[:, 0] = 2  # the filter "up"
     rows[0, 1:] = flat[0]
     np.subtract(flat[1:], flat[:-1], out=rows[1:, 1:])
-    per_metre = round(_DOTS_PER_INCH / 0.0254)
+    per_metre = round(DOTS_PER_INCH / 0.0254)
     chunks = {
         b"IHDR": struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0),
         b"pHYs": struct.pack(">IIB", per_metre, per_metre, 1),

@@ -108,9 +108,11 @@ def _write_figures(report: Report, folder: Path, formats: Sequence[str]) -> dict
     drawn = {}
     for picture in pictures(report):
         files = [f"{picture.name}.{kind}" for kind in formats]
+        pixels = folder / f"{picture.name}.png" if "png" in formats else None
+        image = inline_svg(picture.figure, picture.alternative, picture.name, pixels)
         for name in files:
-            save_figure(picture.figure, folder / name)
-        image = inline_svg(picture.figure, picture.alternative, picture.name)
+            if not name.endswith(".png"):
+                save_figure(picture.figure, folder / name)
         drawn[picture.name] = framed(image, picture.caption, files)
     return drawn
 
