@@ -39,7 +39,7 @@ from pbrdf.optics.geometry import geometry_from_angles
 DIRECTIONS_AIM, FITS_AIM = 500e6, 1e6
 #: Work of a turn on a card and on a processor: a card wants many lanes.
 DIRECTIONS = {"cuda": 1 << 22, "llvm": 1 << 19}
-FITS = {"cuda": 32768, "llvm": 1024}
+FITS = {"cuda": 32768, "llvm": 2048}
 ROUNDS = 5
 
 
