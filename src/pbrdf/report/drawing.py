@@ -7,7 +7,6 @@ their dashes, is brought to pixels here; all places come in pixels.
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -43,8 +42,8 @@ def drawn(figure: Figure, dots_per_inch: float) -> tuple[np.ndarray, str]:
     svg
         A document without ground whose unit is a pixel; artists that are rasterized are pictures in it.
     """
-    inches = figure.get_size_inches()
-    width, height = (dots_per_inch * float(size) for size in inches)
+    across, down = (float(size) for size in figure.get_size_inches())
+    width, height = dots_per_inch * across, dots_per_inch * down
     text = io.StringIO()
     svg = RendererSVG(width, height, text, image_dpi=int(_POINTS_PER_INCH), metadata={"Date": None})
     grounds = [figure.patch, *(ax.patch for ax in figure.axes)]
@@ -53,7 +52,9 @@ def drawn(figure: Figure, dots_per_inch: float) -> tuple[np.ndarray, str]:
     try:
         for ground in grounds:
             ground.set_gid(_GROUND)
-        both = _Both(width, height, dots_per_inch, MixedModeRenderer(figure, *inches, dots_per_inch, svg))
+        both = _Both(
+            width, height, dots_per_inch, MixedModeRenderer(figure, across, down, dots_per_inch, svg)
+        )
         figure.draw(both)
         svg.finalize()
     finally:
@@ -75,7 +76,7 @@ class _Both(RendererAgg):
         for name in ("draw_markers", "draw_image", "draw_quad_mesh", "draw_gouraud_triangles"):
             setattr(self, name, self._twice(getattr(self, name), name))
         self._pixels_of_collection = self.draw_path_collection
-        self.draw_path_collection = self._draw_path_collection
+        self.draw_path_collection = self._draw_path_collection  # type: ignore[method-assign]
 
     def _twice(self, pixels: Any, name: str) -> Any:
         def draw(gc: GraphicsContextBase, *arguments: Any, **more: Any) -> None:
@@ -91,7 +92,7 @@ class _Both(RendererAgg):
         copy.set_dashes(*self._dashes(gc.get_dashes()))
         return copy
 
-    def _dashes(self, pattern: tuple[float, Sequence[float] | None]) -> tuple[float, list[float] | None]:
+    def _dashes(self, pattern: tuple[float, Any]) -> tuple[float, list[float] | None]:
         offset, dashes = pattern
         return self._point * offset, None if dashes is None else [self._point * dash for dash in dashes]
 

@@ -85,11 +85,13 @@ def write_comparison(report: Compared, directory: Path, *, figure_format: str | 
             for name, draw in (("ranking", ranking_figure), ("curves", curves_figure)):
                 made = draw(report)
                 drawn = f"{name}.{figure_format}"
-                save_figure(made, temporary / drawn)
+                picture = temporary / drawn if figure_format == "png" else None
                 names.append(drawn)
                 shown, caption = _CAPTIONS[name]
                 alternative = f"{shown} {comparison.sentences()[0]}"
-                pieces[name] = figure(inline_svg(made, alternative, name), caption, [drawn])
+                pieces[name] = figure(inline_svg(made, alternative, name, picture), caption, [drawn])
+                if picture is None:
+                    save_figure(made, temporary / drawn)
         page = page_text(report, pieces, names[1:])
         (temporary / "index.html").write_text(page, encoding="utf-8")
     return [directory / name for name in names]
