@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -407,6 +407,10 @@ class _State:
         return state
 
 
+#: Fields of a state that iterations leave as they are.
+_FIXED = ("low", "high", "last")
+
+
 class _Result:
     """Collects lanes as they stop."""
 
@@ -449,18 +453,22 @@ def _iterations(
     many = max(ROUNDS, LAUNCH // (len(lane) * residuals.points))
     rounds = dr.opaque(UInt32, ROUNDS if len(lane) > SMALL_BATCH else many)
 
-    def body(count: Any, state: _State, lane: Any, *fixed: Any) -> tuple[Any, ...]:
-        return count + 1, _iterate(residuals, state, lane, *fixed), lane, *fixed
+    # what stays the same is captured: as state of the loop, Dr.Jit would record the body twice to find that out
+    changing = {f.name: getattr(state, f.name) for f in fields(_State) if f.name not in _FIXED}
 
-    result = dr.while_loop(
-        (UInt32(0), state, lane, tolerance, limit),
-        lambda count, state, *_: (count < rounds) & (state.status == int(Status.RUNNING)),
+    def body(count: Any, changing: dict[str, Any]) -> tuple[Any, ...]:
+        reached = _iterate(residuals, replace(state, **changing), lane, tolerance, limit)
+        return count + 1, {name: getattr(reached, name) for name in changing}
+
+    found = dr.while_loop(
+        (UInt32(0), changing),
+        lambda count, changing: (count < rounds) & (changing["status"] == int(Status.RUNNING)),
         body,
         mode="symbolic",
         label="Levenberg-Marquardt",
     )[1]
-    dr.eval(result)
-    return result
+    dr.eval(found)
+    return replace(state, **found)
 
 
 def _iterate(
@@ -676,7 +684,7 @@ def _sums(
     Float = type(u[0])
     triangle = [(i, j) for i in range(size) for j in range(i + 1)]
 
-    def body(place: Any, u: list[Any], lane: Any, cost: Any, A: list[Any], g: list[Any]) -> tuple[Any, ...]:
+    def body(place: Any, cost: Any, A: list[Any], g: list[Any]) -> tuple[Any, ...]:
         point = place if order is None else dr.gather(type(lane), order, place)
         r, J = _jacobian(residuals.function, u, lane, point)
         if residuals.loss == "linear":
@@ -689,19 +697,19 @@ def _sums(
             weighted = [[x * slope for x, (_, slope) in zip(column, losses, strict=True)] for column in J]
         A = [a + _inner(weighted[i], J[j]) for a, (i, j) in zip(A, triangle, strict=True)]
         g = [b + _inner(weighted[i], r) for i, b in enumerate(g)]
-        return place + stride, u, lane, cost, A, g
+        return place + stride, cost, A, g
 
     zero = Float(0.0)
     with dr.suspend_grad():
         u = [dr.detach(v) for v in u]
     out = dr.while_loop(
-        (first, u, lane, zero, [zero] * len(triangle), [zero] * size),
+        (first, zero, [zero] * len(triangle), [zero] * size),
         lambda place, *_: place < end,
         body,
         mode="symbolic",
         label="points",
     )
-    return out[3], list(out[4]), list(out[5])
+    return out[1], list(out[2]), list(out[3])
 
 
 def _jacobian(function: Function, u: list[Any], lane: Any, point: Any) -> tuple[list[Any], list[list[Any]]]:
