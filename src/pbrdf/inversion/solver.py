@@ -10,6 +10,9 @@ Few lanes over many points ("wide") would leave most of the processor idle and r
 iteration is several kernels, the points of a lane are dealt out to lanes of their own, a slice of them at a time, and
 their sums are added up. Between kernels Python is heard, so a fit can be interrupted.
 
+Large batches of many lanes or points run in single precision first, then from their ends in double precision, where
+mostly one evaluation is left: it checks what was found, and its step, too short to be looked at, makes it exact.
+
 The method is Levenberg-Marquardt with Marquardt's scaling, the damping update of Nielsen (1999) and
 projection onto the bounds with an active set (compare Kanzow, Yamashita and Fukushima, J. Comput. Appl. Math.
 172, 375 (2004)): unknowns that a step would carry across a bound are put on it and the step of the others is
@@ -154,9 +157,9 @@ class Solution:
     cost
         What was minimised, ½ Σ ρ(r²) + ½ Σ penalty², shape (B,).
     information
-        JᵀJ at ``u``, shape (B, P, P).
+        JᵀJ at ``u``, or a last step of no account before it, shape (B, P, P).
     gradient
-        Jᵀr at ``u``, shape (B, P).
+        Jᵀr at ``u``, after that last step by the quadratic model, as the cost, shape (B, P).
     status
         Values of :class:`Status`, shape (B,).
     iterations

@@ -49,7 +49,7 @@ def summed(
         The ``size`` sums.
     """
     leaves = list(_leaves(state))
-    kind = next((type(x) for x in leaves if dr.is_jit_v(x)), float)
+    kind: Any = next((type(x) for x in leaves if dr.is_jit_v(x)), float)
     UInt = dr.uint32_array_t(kind)
     moving = [i for i, x in enumerate(leaves) if _moves(x)]
     if by is None:
@@ -93,8 +93,9 @@ def summed(
         label=label,
         max_iterations=-1,
     )
+    tied: Any = dr.replace_grad  # its stub says that it returns nothing
     for x, slope in zip(by, slopes, strict=True):
-        total = [dr.replace_grad(t, dr.fma(s, x, t)) for s, t in zip(slope, total, strict=True)]
+        total = [tied(t, dr.fma(s, x, t)) for s, t in zip(slope, total, strict=True)]
     return list(total)
 
 
