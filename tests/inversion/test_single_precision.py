@@ -1,4 +1,4 @@
-"""Large batches are searched in single precision: the end is that of double precision, and little is left to do there."""
+"""Large batches are searched in single precision: the end is that of double precision, where little is left to do."""
 
 from __future__ import annotations
 

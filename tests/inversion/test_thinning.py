@@ -76,8 +76,8 @@ def test_the_fit_of_dense_data_is_that_of_all_geometries(monkeypatch):
     monkeypatch.setattr(thinning, "ENOUGH", 10**9)
     full = pbrdf.fit(ds, starts=4)
     assert [s.name for s in quick.stages] == ["search", "joint"] and len(full.stages) == 1
-    assert quick.stages[0].points == 1000 and quick.stages[1].points == 3000
-    assert any("searched 1000 of the 3000 geometries" in note for note in quick.notes)
+    assert quick.stages[0].points == 250 and quick.stages[1].points == 3000
+    assert any("searched 250 of the 3000 geometries" in note for note in quick.notes)
     assert quick.goodness.chi2 == pytest.approx(full.goodness.chi2, rel=1e-9)
     assert quick.goodness.data == full.goodness.data == 3000
     for name, e in full.estimates.items():
@@ -93,7 +93,7 @@ def test_the_stepwise_strategy_searches_the_part_too():
     ds = dense(3000)
     result = pbrdf.fit(ds, strategy="stepwise", starts=4)
     names = [(s.name, s.points) for s in result.stages]
-    assert names[-2:] == [("search", 1000), ("joint", 3000)] and names[0][0] == "diffuse"
+    assert names[-2:] == [("search", 250), ("joint", 3000)] and names[0][0] == "diffuse"
     assert result.goodness.chi2 == pytest.approx(pbrdf.fit(ds, starts=4).goodness.chi2, rel=1e-9)
     used = result.comparison["used_for_diffuse"].values
     tilt = result.comparison["facet_tilt"].values

@@ -10,6 +10,9 @@ Few lanes over many points ("wide") would leave most of the processor idle and r
 iteration is several kernels, the points of a lane are dealt out to lanes of their own, a slice of them at a time, and
 their sums are added up. Between kernels Python is heard, so a fit can be interrupted.
 
+Large batches of many lanes or points run in single precision first, then from their ends in double precision, where
+mostly one evaluation is left: it checks what was found, and its step, too short to be looked at, makes it exact.
+
 The method is Levenberg-Marquardt with Marquardt's scaling, the damping update of Nielsen (1999) and
 projection onto the bounds with an active set (compare Kanzow, Yamashita and Fukushima, J. Comput. Appl. Math.
 172, 375 (2004)): unknowns that a step would carry across a bound are put on it and the step of the others is
@@ -20,7 +23,7 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -154,9 +157,9 @@ class Solution:
     cost
         What was minimised, ½ Σ ρ(r²) + ½ Σ penalty², shape (B,).
     information
-        JᵀJ at ``u``, shape (B, P, P).
+        JᵀJ at ``u``, or a last step of no account before it, shape (B, P, P).
     gradient
-        Jᵀr at ``u``, shape (B, P).
+        Jᵀr at ``u``, after that last step by the quadratic model, as the cost, shape (B, P).
     status
         Values of :class:`Status`, shape (B,).
     iterations
@@ -407,6 +410,10 @@ class _State:
         return state
 
 
+#: Fields of a state that iterations leave as they are.
+_FIXED = ("low", "high", "last")
+
+
 class _Result:
     """Collects lanes as they stop."""
 
@@ -449,18 +456,22 @@ def _iterations(
     many = max(ROUNDS, LAUNCH // (len(lane) * residuals.points))
     rounds = dr.opaque(UInt32, ROUNDS if len(lane) > SMALL_BATCH else many)
 
-    def body(count: Any, state: _State, lane: Any, *fixed: Any) -> tuple[Any, ...]:
-        return count + 1, _iterate(residuals, state, lane, *fixed), lane, *fixed
+    # what stays the same is captured: as state of the loop, Dr.Jit would record the body twice to find that out
+    changing = {f.name: getattr(state, f.name) for f in fields(_State) if f.name not in _FIXED}
 
-    result = dr.while_loop(
-        (UInt32(0), state, lane, tolerance, limit),
-        lambda count, state, *_: (count < rounds) & (state.status == int(Status.RUNNING)),
+    def body(count: Any, changing: dict[str, Any]) -> tuple[Any, ...]:
+        reached = _iterate(residuals, replace(state, **changing), lane, tolerance, limit)
+        return count + 1, {name: getattr(reached, name) for name in changing}
+
+    found = dr.while_loop(
+        (UInt32(0), changing),
+        lambda count, changing: (count < rounds) & (changing["status"] == int(Status.RUNNING)),
         body,
         mode="symbolic",
         label="Levenberg-Marquardt",
     )[1]
-    dr.eval(result)
-    return result
+    dr.eval(found)
+    return replace(state, **found)
 
 
 def _iterate(
@@ -581,7 +592,7 @@ def _judge(
         u=[dr.select(accepted | last, a, b) for a, b in zip(trial, state.u, strict=True)],
         low=state.low,
         high=state.high,
-        cost=dr.select(accepted, cost, dr.select(last, state.cost - predicted, state.cost)),
+        cost=dr.select(accepted, cost, dr.select(last, dr.maximum(state.cost - predicted, 0.0), state.cost)),
         A=keep(packed, state.A),
         g=[
             dr.select(last, after, x)

@@ -49,7 +49,7 @@ def summed(
         The ``size`` sums.
     """
     leaves = list(_leaves(state))
-    kind = next((type(x) for x in leaves if dr.is_jit_v(x)), float)
+    kind: Any = next((type(x) for x in leaves if dr.is_jit_v(x)), float)
     UInt = dr.uint32_array_t(kind)
     moving = [i for i, x in enumerate(leaves) if _moves(x)]
     if by is None:
@@ -59,10 +59,17 @@ def summed(
         by = by if moving else []
         seeds = [dict(zip(moving, _tangents(x, [leaves[i] for i in moving]), strict=True)) for x in by]
 
-    def body(j: Any, total: Any, slopes: Any, leaves: Any, seeds: Any) -> tuple[Any, ...]:
-        own = list(leaves)
+    constants = [dr.detach(x) for x in leaves]
+    width = dr.width(constants, count)
+    for i in moving:
+        # a derivative that is wider than its variable would be added up over the lanes
+        constants[i] = constants[i] + dr.zeros(kind, width)
+
+    # what stays the same is captured: as state of the loop, Dr.Jit would record the body twice to find that out
+    def body(j: Any, total: Any, slopes: Any) -> tuple[Any, ...]:
+        own = list(constants)
         for i in moving:
-            own[i] = kind(leaves[i])
+            own[i] = kind(constants[i])
             dr.enable_grad(own[i])
         # the sign makes variables that nothing else depends on: a sweep clears the derivatives of all others
         values = [-kind(v) for v in term(j, *_filled(state, iter(own)))]
@@ -76,20 +83,19 @@ def summed(
             dr.clear_grad(values)
             dr.clear_grad(own)
         total = [t - dr.detach(v) for t, v in zip(total, values, strict=True)]
-        return j + 1, total, found, leaves, seeds
+        return j + 1, total, found
 
     zeros = [dr.zeros(kind, 1) for _ in range(size)]
-    values = [dr.detach(x) for x in leaves]
-    width = dr.width(values, count)
-    for i in moving:
-        # a derivative that is wider than its variable would be added up over the lanes
-        values[i] = values[i] + dr.zeros(kind, width)
-    start = (UInt(0), zeros, [list(zeros) for _ in by], values, seeds)
-    _, total, slopes, _, _ = dr.while_loop(
-        start, lambda j, *_: j < count, body, label=label, max_iterations=-1
+    _, total, slopes = dr.while_loop(
+        (UInt(0), zeros, [list(zeros) for _ in by]),
+        lambda j, *_: j < count,
+        body,
+        label=label,
+        max_iterations=-1,
     )
+    tied: Any = dr.replace_grad  # its stub says that it returns nothing
     for x, slope in zip(by, slopes, strict=True):
-        total = [dr.replace_grad(t, dr.fma(s, x, t)) for s, t in zip(slope, total, strict=True)]
+        total = [tied(t, dr.fma(s, x, t)) for s, t in zip(slope, total, strict=True)]
     return list(total)
 
 
