@@ -22,7 +22,7 @@ from pbrdf.optics.facet_reflection import facet_reflection, tan2_tilt
 from pbrdf.optics.facets import projected_area_density
 from pbrdf.optics.fresnel import mueller_reflection
 from pbrdf.optics.geometry import Geometry
-from pbrdf.optics.quadrature import ACCURACIES, CLEAR_WEDGE, SIGMA_25
+from pbrdf.optics.quadrature import ACCURACIES
 from pbrdf.optics.shadowing import SHADOWING
 from pbrdf.optics.transmission import (
     NORMALIZATIONS,
@@ -133,18 +133,7 @@ class _GaussianFacets(Model):
 
     def lane_groups(self, scalars: Mapping[str, Any], size: int, part: str) -> Sequence[np.ndarray | None]:
         """Directions whose average over the facets takes the mapped wedge apart from the others."""
-        if part == "specular" or self.chosen["accuracy"] in ("high", "fast"):
-            return [None]
-        sigma = np.asarray(scalars["sigma"])
-        # zenith angle up to which the edge of the wedge lies farther out than CLEAR_WEDGE
-        limit = np.where(sigma <= SIGMA_25, np.arctan2(1.0, CLEAR_WEDGE * sigma), -1.0)
-        if all(np.max(scalars[name]) < np.min(limit) for name in ("theta_i", "theta_r")):
-            return [None]
-        wedge = np.maximum(scalars["theta_i"], scalars["theta_r"]) >= limit
-        wedge = np.broadcast_to(wedge, (size,))
-        if wedge.all() or not wedge.any():
-            return [None]
-        return [np.flatnonzero(~wedge).astype(np.uint32), np.flatnonzero(wedge).astype(np.uint32)]
+        return [None]
 
     def lobe_width(self, values: Mapping[str, Any] | None = None) -> Any:
         """σ."""

@@ -32,6 +32,8 @@ __all__ = [
 
 NORMALIZATIONS = ("weighted", "visible")
 TRANSMITTANCES = ("flux", "amplitude")
+#: E[W M_t] by itself, not over E[W], is as exact as that ratio if W counts as this many times steeper.
+_UNWEIGHTED = 6.0
 
 
 def exit_polarisation(
@@ -71,7 +73,10 @@ def exit_polarisation(
 
     # W only where it is used: Dr.Jit 1.5 crashes on derivatives of a loop of which an output was dropped
     weighted = normalization == "weighted"
-    found = facet_average(integrand, 4 if weighted else 3, geometry, sigma, (n, kappa, k), accuracy)
+    steepness = dr.abs(k - 1.0) * (1.0 if weighted else _UNWEIGHTED)
+    found = facet_average(
+        integrand, 4 if weighted else 3, geometry, sigma, (n, kappa, k), accuracy, dr.detach(steepness)
+    )
     intensity, q, u = found[:3]
     if weighted:
         scale = _inverse(found[3])
@@ -99,7 +104,8 @@ def exit_and_entry_polarisation(
         row = _transmission_vector(m, mu_i, geometry.p_i, geometry.s_i, n, kappa)
         return (W, *(W * out * enter for out in column for enter in row))
 
-    E_W, *block = facet_average(integrand, 10, geometry, sigma, (n, kappa, k), accuracy)
+    steepness = dr.detach(dr.abs(k - 1.0))
+    E_W, *block = facet_average(integrand, 10, geometry, sigma, (n, kappa, k), accuracy, steepness)
     scale = _inverse(E_W)
     return [[block[3 * i + j] * scale for j in range(3)] for i in range(3)]
 
