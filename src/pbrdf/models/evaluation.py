@@ -44,8 +44,8 @@ class Evaluable(Protocol):
     def kernel(self, geometry: Geometry, values: Mapping[str, Any], part: str = "total") -> Matrix: ...
 
     def lane_groups(
-        self, scalars: Mapping[str, Any], size: int, part: str
-    ) -> Sequence[np.ndarray | None]: ...
+        self, scalars: Mapping[str, Any], floats: Mapping[str, Any], size: int, part: str
+    ) -> Sequence[tuple[Evaluable, Any]]: ...
 
 
 def kernel_from_angles(model: Evaluable, theta_i: Any, theta_r: Any, phi: Any, values: Any, part: str) -> Any:
@@ -228,8 +228,8 @@ def _evaluate_numpy(
         piece = {k: (v if isinstance(v, float) else v[start:stop]) for k, v in flat.items()}
         inputs = {k: backend.upload(backend.Float, v) for k, v in piece.items() if not isinstance(v, float)}
         out = dr.empty(backend.Float, (stop - start) * width)
-        for lanes in model.lane_groups(piece, stop - start, part):
-            _launch(model, backend, piece, inputs, lanes, stop - start, absent, part, function, out)
+        for group, lanes in model.lane_groups(piece, piece | inputs, stop - start, part):
+            _launch(group, backend, piece, inputs, lanes, stop - start, absent, part, function, out)
         pieces.append(out.numpy())
     result = pieces[0] if len(pieces) == 1 else np.concatenate(pieces or [np.empty(0)])
     return result.reshape(*grid, *shape)
@@ -240,7 +240,7 @@ def _launch(
     backend: Backend,
     scalars: dict[str, Any],
     inputs: dict[str, Any],
-    lanes: np.ndarray | None,
+    lanes: Any,
     size: int,
     absent: Sequence[str],
     part: str,
@@ -251,7 +251,7 @@ def _launch(
     import drjit as dr
 
     Float, UInt32 = backend.Float, backend.UInt32
-    index = dr.arange(UInt32, size) if lanes is None else backend.upload(UInt32, lanes)
+    index = dr.arange(UInt32, size) if lanes is None else lanes
 
     def fetch(name: str) -> Any:
         # scalars are opaque, so that a new value does not mean a new kernel

@@ -24,6 +24,7 @@ The rule is chosen for each lane of the computation apart.
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -34,7 +35,7 @@ from pbrdf.optics.geometry import Geometry
 from pbrdf.optics.powers import polynomial
 from pbrdf.optics.transport import transported_rows
 
-__all__ = ["ACCURACIES", "Rules", "choose_rules", "facet_average", "table", "wedge_distance"]
+__all__ = ["ACCURACIES", "RULES", "choose_rule", "facet_average", "table", "wedge_distance"]
 
 #: Edges beyond this many standard deviations count as this far.
 _FAR = 50.0
@@ -78,6 +79,8 @@ ACCURACIES: dict[str, _Accuracy | None] = {
     "draft": _Accuracy(1.2, 3, (4, 4, 2, 2), (4.5, 4.5, 4.5), 4.5, 0.12, 0.0),
     "fast": None,
 }
+#: Cubatures of the whole plane of 7, 12 and 26 points, rows along the nearer edge, rows between both.
+RULES = ("seven", "twelve", "many", "one_edge", "both_edges")
 #: For 7 and for 12 points: distance over √σ, and steepness times σ^{3/2} over distance, that are just exact enough.
 _CARE = ((32.0, 0.002), (22.0, 0.006))
 
@@ -95,10 +98,13 @@ def _pairs(count: int) -> list[tuple[float, float]]:
     return [(x, w) for x, w in _hermite(count) if x > 0.0]
 
 
-def _clear_rules() -> tuple[list[tuple[float, float, float]], list[int]]:
-    """Rules of the whole plane as pairs of points (u, ±v) with the weight of each point; where each rule starts."""
-    root = math.sqrt(3.0)
-    hexagon = [(-root, 1.0, 1.0 / 12.0), (0.0, 2.0, 1.0 / 12.0), (root, 1.0, 1.0 / 12.0), (0.0, 0.0, 0.25)]
+#: E2^{r²} 5-1 as pairs of points (u, ±v), each of this weight, besides the origin, which has half of the whole.
+_SEVEN = ((0.0, 2.0), (math.sqrt(3.0), 1.0), (-math.sqrt(3.0), 1.0))
+_SEVEN_WEIGHT = 1.0 / 12.0
+
+
+def _clear_rules() -> tuple[list[tuple[float, ...]], int]:
+    """Rules of 12 and of 26 points, pairs (u, ±v) with the weight of each point; the length of the first."""
     s, t = (math.sqrt((9.0 - sign * 3.0 * math.sqrt(5.0)) / 4.0) for sign in (1.0, -1.0))
     w_s, w_t = ((5.0 + sign * 2.0 * math.sqrt(5.0)) / 45.0 for sign in (1.0, -1.0))
     six = math.sqrt(6.0)
@@ -106,54 +112,74 @@ def _clear_rules() -> tuple[list[tuple[float, float, float]], list[int]]:
     twelve += [(sign * x, x, w) for x, w in ((s, w_s), (t, w_t)) for sign in (1.0, -1.0)]
     rows = zip(_hermite(5), (4, 6, 6, 6, 4), strict=True)
     product = [(u, v, w * w_v) for (u, w), count in rows for v, w_v in _pairs(count)]
-    rules = hexagon, twelve, product
-    starts = [sum(map(len, rules[:j])) for j in range(4)]
-    return [pair for rule in rules for pair in rule], starts
+    return [(*pair, 0.0) for pair in twelve + product], len(twelve)
 
 
-def _row_rules() -> tuple[dict[str, int], list[tuple[float, ...]], list[tuple[float, float]]]:
-    """Trapezoidal rules of all accuracies, and the pairs of points across their rows.
+class _Tables(NamedTuple):
+    """Trapezoidal rules of all accuracies.
 
-    Returns
-    -------
-    starts, rows, pairs
-        First row by accuracy; rows (Φ(z), Φ(−z), weight, first pair, number of pairs); pairs (v, weight of each point).
+    Attributes
+    ----------
+    ranges_of
+        First row and number of rows by accuracy.
+    rows
+        Φ(z), 1 − Φ(z), weight, and how far from the middle column a row of the rule for both edges reaches: the corners
+        of the square are left out.
+    ranges
+        First pair of points across a row of the rule for one edge, and number of pairs.
+    pairs
+        v and the weight of each of the points ±v.
     """
-    starts: dict[str, int] = {}
-    rows: list[tuple[float, ...]] = []
-    pairs: list[tuple[float, float]] = []
+
+    ranges_of: dict[str, tuple[int, int]]
+    rows: list[tuple[float, ...]]
+    ranges: list[tuple[float, ...]]
+    pairs: list[tuple[float, ...]]
+
+
+def _row_rules() -> _Tables:
+    tables = _Tables({}, [], [], [])
     first: dict[int, int] = {}
     for name, rule in ACCURACIES.items():
         if rule is None:
             continue
-        starts[name] = len(rows)
-        z = [j * rule.step for j in range(-rule.half, rule.half + 1)]
+        tables.ranges_of[name] = len(tables.rows), 2 * rule.half + 1
+        middle = range(-rule.half, rule.half + 1)
+        z = [j * rule.step for j in middle]
         weights = [math.exp(-0.5 * x * x) for x in z]
         total = math.fsum(weights)
-        for j, (x, weight) in enumerate(zip(z, weights, strict=True)):
-            count = rule.across[abs(j - rule.half)]
-            if count not in first:
-                first[count] = len(pairs)
-                pairs += _pairs(count)
+        for j, x, weight in zip(middle, z, weights, strict=True):
             below, above = (0.5 * math.erfc(sign * x / math.sqrt(2.0)) for sign in (-1.0, 1.0))
-            rows.append((below, above, weight / total, float(first[count]), 0.5 * count))
-    return starts, rows, pairs
+            reach = min(rule.half, int(math.sqrt((rule.half + 0.4) ** 2 - j * j)))
+            tables.rows.append((below, above, weight / total, reach))
+            count = rule.across[abs(j)]
+            if count not in first:
+                first[count] = len(tables.pairs)
+                tables.pairs.extend(_pairs(count))
+            tables.ranges.append((first[count], count // 2))
+    return tables
 
 
-_CLEAR, _CLEAR_STARTS = _clear_rules()
-_ROW_STARTS, _ROWS, _ACROSS = _row_rules()
+_CLEAR, _TWELVE = _clear_rules()
+_TABLES = _row_rules()
 
 
 def table(F: type, column: list[float]) -> Callable[..., Any]:
-    """Numbers to look up by index: a function of the index and, if not always wanted, of a mask."""
+    """Numbers to look up by index."""
     if F is float:
-        return lambda index, active=True: column[index]
+        return lambda index: column[index]
     values = F(column)
-    return lambda index, active=True: dr.gather(F, values, index, active)
+    return lambda index: dr.gather(F, values, index)
 
 
-def _tables(F: type, rows: list[tuple[float, ...]] | list[tuple[float, float]]) -> list[Callable[..., Any]]:
-    return [table(F, list(column)) for column in zip(*rows, strict=True)]
+def _packets(F: type, rows: list[tuple[float, ...]]) -> Callable[[Any], Any]:
+    """Rows of two or four numbers to look up by index, faster than one number at a time."""
+    if F is float:
+        return lambda index: rows[index]
+    values = F([x for row in rows for x in row])
+    name = f"Array{len(rows[0])}f" + ("64" if dr.type_v(F) == dr.VarType.Float64 else "")
+    Packet = getattr(sys.modules[F.__module__], name)
+    return lambda index: dr.gather(Packet, values, index)
 
 
 def wedge_distance(cos_theta: Any, sin_theta: Any, sigma: Any) -> Any:
@@ -161,27 +187,10 @@ def wedge_distance(cos_theta: Any, sin_theta: Any, sigma: Any) -> Any:
     return cos_theta / dr.maximum(sigma * sin_theta, cos_theta / _FAR)
 
 
-class Rules(NamedTuple):
-    """Masks that tell which rule a lane takes; the last, for both edges, is taken where none of these holds.
-
-    Attributes
-    ----------
-    seven, twelve, many
-        Cubatures of the whole plane, of 7, 12 and 26 points.
-    one_edge
-        Rows along the nearer edge.
-    """
-
-    seven: Any
-    twelve: Any
-    many: Any
-    one_edge: Any
-
-
-def choose_rules(
-    c_i: Any, c_r: Any, sigma: Any, steepness: Any, rule: _Accuracy, number: Callable[[float], Any] = float
-) -> Rules:
-    """Tell which rule each lane takes.
+def choose_rule(
+    c_i: Any, c_r: Any, sigma: Any, steepness: Any, accuracy: str, number: Callable[[float], Any] = float
+) -> Any:
+    """Tell which of ``RULES`` each lane takes, by index: the farther the edges and the smaller σ, the lower.
 
     Parameters
     ----------
@@ -189,23 +198,30 @@ def choose_rules(
         Distances of the edges and slope standard deviation.
     steepness
         See :func:`facet_average`.
-    rule
-        Accuracy.
+    accuracy
+        One of ``ACCURACIES`` other than ``fast``.
     number
-        How a number of the rule enters.
+        How a number of the accuracy enters.
     """
+    rule = ACCURACIES[accuracy]
+    assert rule is not None
+    UInt = dr.uint32_array_t(type(sigma))
     nearer, farther = dr.minimum(c_i, c_r), dr.maximum(c_i, c_r)
-    smooth = sigma <= number(rule.rough)
     root, care = dr.sqrt(sigma), number(rule.care)
     steep = care * steepness * sigma * root
-    masks: list[Any] = []
-    taken = ~smooth
-    for clear, (spread, slope) in zip(rule.clear, (*_CARE, (0.0, math.inf)), strict=True):
-        limit = dr.maximum(number(clear), dr.maximum((care * spread) * root, (1.0 / slope) * steep))
-        mask = (nearer > limit) & ~taken
-        masks.append(mask)
-        taken = taken | mask
-    return Rules(*masks, (farther > number(rule.far)) & ~taken)
+    seven, twelve, many = (number(x) for x in rule.clear)
+    (spread_7, slope_7), (spread_12, slope_12) = _CARE
+    seven = dr.maximum(seven, dr.maximum(care * spread_7 * root, steep * (1.0 / slope_7)))
+    twelve = dr.maximum(twelve, dr.maximum(care * spread_12 * root, steep * (1.0 / slope_12)))
+    index: Any = UInt(4)
+    for place, mask in (
+        (3, farther > number(rule.far)),
+        (2, nearer > many),
+        (1, nearer > twelve),
+        (0, nearer > seven),
+    ):
+        index = dr.select(mask, UInt(place), index)
+    return dr.select(sigma <= number(rule.rough), index, UInt(4))
 
 
 def facet_average(
@@ -216,6 +232,7 @@ def facet_average(
     args: tuple[Any, ...],
     accuracy: str = "default",
     steepness: Any = 1.0,
+    rule: str | None = None,
 ) -> list[Any]:
     """Integrate functions of the facet normal over the lit and seen facets, ∫ P g dω.
 
@@ -236,6 +253,8 @@ def facet_average(
     steepness
         Size of the exponent of the local cosines' product with which the integrand goes, |k − 1|: where it is small,
         fewer nodes do. For the ratio of two such integrals; each of them by itself needs six times that.
+    rule
+        The one of ``RULES`` that all lanes take, where it is known: what is compiled is shorter then.
 
     Returns
     -------
@@ -246,138 +265,202 @@ def facet_average(
     UInt = dr.uint32_array_t(F)
     c_i = wedge_distance(geometry.cos_i, geometry.sin_i, sigma)
     c_r = wedge_distance(geometry.cos_r, geometry.sin_r, sigma)
-    rule = ACCURACIES[accuracy]
-    if rule is None:
+    if accuracy == "fast":
         return _transported_average(integrand, size, geometry, sigma, c_i, c_r, args)
-    zeros = [dr.zeros(F, 1) for _ in range(size)]
-    vectors = tuple(geometry)  # as loop state a plain tuple, see Geometry
 
     # the rule enters as opaque data, so that the accuracies share one kernel
-    lanes = choose_rules(c_i, c_r, sigma, steepness, rule, lambda x: dr.opaque(F, x))
-    first_row, rows = dr.opaque(UInt, _ROW_STARTS[accuracy]), dr.opaque(UInt, 2 * rule.half + 1)
-    row_table = _tables(F, _ROWS)
-    counts = [b - a for a, b in zip(_CLEAR_STARTS, _CLEAR_STARTS[1:], strict=False)]
-    offset, count = UInt(_CLEAR_STARTS[2]), dr.select(lanes.many, UInt(counts[2]), UInt(0))
-    for mask, j in ((lanes.twelve, 1), (lanes.seven, 0)):
-        offset = dr.select(mask, UInt(_CLEAR_STARTS[j]), offset)
-        count = dr.select(mask, UInt(counts[j]), count)
-    whole_plane = _tables(F, _CLEAR)
+    first, count = _TABLES.ranges_of[accuracy]
+    rows = _Rows(
+        dr.opaque(UInt, first),
+        dr.opaque(UInt, count),
+        *(_packets(F, numbers) for numbers in (_TABLES.rows, _TABLES.ranges, _TABLES.pairs)),
+    )
+    # as loop state a plain tuple, see Geometry
+    state = sigma, tuple(geometry), args
 
-    def clear_body(j: Any, total: Any, sigma: Any, vectors: Any, args: Any) -> tuple[Any, ...]:
-        u, v, weight = (column(offset + j, j < count) for column in whole_plane)
-        u, v = sigma * u, sigma * v
-        inverse = dr.rsqrt(dr.fma(u, u, dr.fma(v, v, 1.0)))
-        geometry = Geometry(*vectors)
-        # across the slope towards the viewer: both points have the same local exit angle
-        cos_phi, sin_phi = -geometry.s_r[1], geometry.s_r[0]
-        mu_r = inverse * dr.fma(-u, geometry.sin_r, geometry.cos_r)
-        for side in (v, -v):
-            x, y = dr.fma(-u, cos_phi, side * sin_phi), dr.fma(-u, sin_phi, -side * cos_phi)
-            mu_i = inverse * dr.fma(-x, geometry.sin_i, geometry.cos_i)
-            values = integrand((x * inverse, y * inverse, inverse), mu_i, mu_r, geometry, args)
-            total = _add(total, weight, values)
-        return j + 1, total, sigma, vectors, args
+    def zeros() -> list[Any]:
+        return [dr.zeros(F, 1) for _ in range(size)]
 
-    clear = dr.while_loop(
-        (UInt(0), zeros, sigma, vectors, args),
-        lambda j, *_: j < count,
-        clear_body,
-        label="facets",
-        max_iterations=-1,
-    )[1]
+    edges = *state, c_i, c_r
+    if rule is not None:
+        index: Any = RULES.index(rule)
+    else:
+        index = choose_rule(c_i, c_r, sigma, steepness, accuracy, lambda x: dr.opaque(F, x))
 
-    def add_facet(total: Any, x: Any, y: Any, weight: Any, sigma: Any, vectors: Any, args: Any) -> list[Any]:
-        """Add a facet inside the wedge, with slopes x and y in standard deviations."""
-        geometry = Geometry(*vectors)
-        x, y = sigma * x, sigma * y
-        inverse = dr.rsqrt(dr.fma(x, x, dr.fma(y, y, 1.0)))
-        mu_i = inverse * dr.fma(-x, geometry.sin_i, geometry.cos_i)
-        mu_r = inverse * dr.fma(x, geometry.omega_r[0], dr.fma(y, geometry.omega_r[1], geometry.omega_r[2]))
-        valid = (mu_i > 0.0) & (mu_r > 0.0)  # but for rounding
-        mu_i, mu_r = dr.select(valid, mu_i, 1.0), dr.select(valid, mu_r, 1.0)
-        values = integrand((x * inverse, y * inverse, inverse), mu_i, mu_r, geometry, args)
-        return _add(total, dr.select(valid, weight, 0.0), values)
+    def lanes(j: int) -> Any:
+        return index == j
 
-    # one edge: rows along it
-    (f, e), c_near, *_ = _nearer_edge_axes(geometry, c_i, c_r)
-    across = _tables(F, _ACROSS)
+    sums = []
+    if rule in (None, "seven"):
+        sums.append(_sum_seven(integrand, zeros, state, None if rule else lanes(0)))
+    if rule in (None, "twelve", "many"):
+        sums.append(_sum_clear(integrand, zeros, state, lanes(1), lanes(2)))
+    if rule in (None, "one_edge"):
+        sums.append(_sum_edge(integrand, zeros, edges, lanes(3), rows))
+    if rule in (None, "both_edges"):
+        sums.append(_sum_wedge(integrand, zeros, edges, lanes(4), rows))
+    return [sum(x[1:], x[0]) for x in zip(*sums, strict=True)]
 
-    def edge_row(row: Any, total: Any, sigma: Any, vectors: Any, axes: Any, args: Any) -> tuple[Any, ...]:
-        f, e, beyond = axes
-        below, above, weight, first, pairs = (
-            column(first_row + row, lanes.one_edge & (row < rows)) for column in row_table
-        )
-        w, share = _between(below, above, 0.0, beyond)
-        first, pairs = UInt(first), UInt(pairs)
 
-        def pair(j: Any, total: Any, sigma: Any, vectors: Any, axes: Any, args: Any) -> tuple[Any, ...]:
-            f, e, w, row_weight = axes
-            v, weight = (column(first + j, j < pairs) for column in across)
-            for side in (v, -v):
-                x, y = dr.fma(f[0], w, e[0] * side), dr.fma(f[1], w, e[1] * side)
-                total = add_facet(total, x, y, row_weight * weight, sigma, vectors, args)
-            return j + 1, total, sigma, vectors, axes, args
+# Each of these loops sums up from 0: only then can Dr.Jit differentiate it in reverse without storing its states.
 
-        found = dr.while_loop(
-            (UInt(0), list(zeros), sigma, vectors, (f, e, w, weight * share), args),
-            lambda j, *_: j < pairs,
-            pair,
-            label="edge pairs",
-            max_iterations=-1,
-        )[1]
-        total = [a + b for a, b in zip(total, found, strict=True)]
-        return row + 1, total, sigma, vectors, axes, args
 
-    edge = dr.while_loop(
-        (UInt(0), list(zeros), sigma, vectors, (f, e, _tail(c_near)), args),
-        lambda row, *_: lanes.one_edge & (row < rows),
-        edge_row,
-        label="edge rows",
-        max_iterations=-1,
-    )[1]
+def _loop(label: str, state: tuple[Any, ...], more: Callable[[Any], Any], body: Callable[..., Any]) -> Any:
+    """Run ``body(j, total, *rest)``, which returns the new total, while ``more(j)``; returns the last total."""
 
-    # both edges
-    wedge_lanes = ~(lanes.seven | lanes.twelve | lanes.many | lanes.one_edge)
+    def step(j: Any, total: Any, *rest: Any) -> tuple[Any, ...]:
+        return j + 1, body(j, total, *rest), *rest
 
-    def wedge_row(row: Any, total: Any, sigma: Any, vectors: Any, axes: Any, args: Any) -> tuple[Any, ...]:
-        f, e, beyond, lower, upper = axes
-        below, above, weight = (column(first_row + row, wedge_lanes & (row < rows)) for column in row_table[:3])
-        w, share = _between(below, above, 0.0, beyond)
-        low, high = dr.fma(lower[1], w, lower[0]), dr.fma(upper[1], w, upper[0])
-        ends = (_tail(-low), _tail(high))
-
-        def node(column: Any, total: Any, sigma: Any, vectors: Any, axes: Any, args: Any) -> tuple[Any, ...]:
-            f, e, w, row_weight, ends = axes
-            below, above, weight = (c(first_row + column, column < rows) for c in row_table[:3])
-            v, share = _between(below, above, *ends)
-            x, y = dr.fma(f[0], w, e[0] * v), dr.fma(f[1], w, e[1] * v)
-            total = add_facet(total, x, y, row_weight * weight * share, sigma, vectors, args)
-            return column + 1, total, sigma, vectors, axes, args
-
-        found = dr.while_loop(
-            (UInt(0), list(zeros), sigma, vectors, (f, e, w, weight * share, ends), args),
-            lambda column, *_: column < rows,
-            node,
-            label="wedge columns",
-            max_iterations=-1,
-        )[1]
-        total = [a + b for a, b in zip(total, found, strict=True)]
-        return row + 1, total, sigma, vectors, axes, args
-
-    f, e, w_max, lower, upper = _wedge_axes(geometry, c_i, c_r)
-    wedge = dr.while_loop(
-        (UInt(0), list(zeros), sigma, vectors, (f, e, _tail(w_max), lower, upper), args),
-        lambda row, *_: wedge_lanes & (row < rows),
-        wedge_row,
-        label="wedge rows",
-        max_iterations=-1,
-    )[1]
-    # every loop sums up from 0: only then can Dr.Jit differentiate it in reverse without storing its states
-    return [a + b + c for a, b, c in zip(clear, edge, wedge, strict=True)]
+    F = type(state[0][0])
+    UInt = dr.uint32_array_t(F)
+    return dr.while_loop((UInt(0), *state), lambda j, *_: more(j), step, label=label, max_iterations=-1)[1]
 
 
 def _add(total: Any, weight: Any, values: tuple[Any, ...]) -> list[Any]:
     return [dr.fma(weight, value, t) for value, t in zip(values, total, strict=True)]
+
+
+def _add_pair(
+    integrand: Callable[..., Any],
+    total: Any,
+    u: Any,
+    v: Any,
+    inverse: Any,
+    weight: Any,
+    vectors: Any,
+    args: Any,
+) -> list[Any]:
+    """Add facets of slope u towards the viewer and ±v across, 1/√(1 + u² + v²) given: both see the same exit angle."""
+    geometry = Geometry(*vectors)
+    cos_phi, sin_phi = -geometry.s_r[1], geometry.s_r[0]
+    mu_r = inverse * dr.fma(-u, geometry.sin_r, geometry.cos_r)
+    for side in (v, -v):
+        x, y = dr.fma(-u, cos_phi, side * sin_phi), dr.fma(-u, sin_phi, -side * cos_phi)
+        mu_i = inverse * dr.fma(-x, geometry.sin_i, geometry.cos_i)
+        values = integrand((x * inverse, y * inverse, inverse), mu_i, mu_r, geometry, args)
+        total = _add(total, weight, values)
+    return total
+
+
+def _add_facet(
+    integrand: Callable[..., Any], total: Any, x: Any, y: Any, weight: Any, vectors: Any, args: Any
+) -> list[Any]:
+    """Add a facet of slopes x and y within the wedge."""
+    geometry = Geometry(*vectors)
+    inverse = dr.rsqrt(dr.fma(x, x, dr.fma(y, y, 1.0)))
+    mu_i = inverse * dr.fma(-x, geometry.sin_i, geometry.cos_i)
+    mu_r = inverse * dr.fma(x, geometry.omega_r[0], dr.fma(y, geometry.omega_r[1], geometry.omega_r[2]))
+    valid = (mu_i > 0.0) & (mu_r > 0.0)  # but for rounding
+    mu_i, mu_r = dr.select(valid, mu_i, 1.0), dr.select(valid, mu_r, 1.0)
+    values = integrand((x * inverse, y * inverse, inverse), mu_i, mu_r, geometry, args)
+    return _add(total, dr.select(valid, weight, 0.0), values)
+
+
+def _sum_seven(integrand: Callable[..., Any], zeros: Callable[[], Any], state: Any, lanes: Any) -> list[Any]:
+    """Seven points of the whole plane, at once: six of them have the same length. ``lanes`` None: in all lanes."""
+
+    def body(_: Any, total: Any, sigma: Any, vectors: Any, args: Any) -> list[Any]:
+        inverse = dr.rsqrt(dr.fma(4.0 * sigma, sigma, 1.0))
+        for u, v in _SEVEN:
+            total = _add_pair(integrand, total, sigma * u, sigma * v, inverse, _SEVEN_WEIGHT, vectors, args)
+        geometry = Geometry(*vectors)
+        flat = integrand((0.0, 0.0, 1.0), geometry.cos_i, geometry.cos_r, geometry, args)
+        return _add(total, 0.5, flat)
+
+    if lanes is None:
+        return body(0, zeros(), *state)
+    return _loop("seven facets", (zeros(), *state), lambda j: lanes & (j < 1), body)
+
+
+def _sum_clear(
+    integrand: Callable[..., Any], zeros: Callable[[], Any], state: Any, twelve: Any, many: Any
+) -> list[Any]:
+    """Pairs of points of the whole plane."""
+    F = type(state[0])
+    UInt = dr.uint32_array_t(F)
+    points = _packets(F, _CLEAR)
+    start = dr.select(many, UInt(_TWELVE), UInt(0))
+    count = dr.select(many, UInt(len(_CLEAR) - _TWELVE), dr.select(twelve, UInt(_TWELVE), UInt(0)))
+
+    def body(j: Any, total: Any, sigma: Any, vectors: Any, args: Any) -> list[Any]:
+        u, v, weight, _ = points(start + j)
+        u, v = sigma * u, sigma * v
+        inverse = dr.rsqrt(dr.fma(u, u, dr.fma(v, v, 1.0)))
+        return _add_pair(integrand, total, u, v, inverse, weight, vectors, args)
+
+    return _loop("facets", (zeros(), *state), lambda j: j < count, body)
+
+
+class _Rows(NamedTuple):
+    """Rows of an accuracy: the first in the tables, their number, and the tables to look them up."""
+
+    first: Any
+    count: Any
+    rows: Callable[[Any], Any]
+    ranges: Callable[[Any], Any]
+    pairs: Callable[[Any], Any]
+
+
+def _sum_edge(
+    integrand: Callable[..., Any], zeros: Callable[[], Any], state: Any, lanes: Any, rows: _Rows
+) -> list[Any]:
+    """Rows along the nearer edge."""
+
+    def row(j: Any, total: Any, sigma: Any, vectors: Any, args: Any, c_i: Any, c_r: Any) -> list[Any]:
+        UInt = type(rows.count)
+        # here and not before the loop, which other lanes never enter
+        (f, e), c_near, *_ = _nearer_edge_axes(Geometry(*vectors), c_i, c_r)
+        below, above, weight, _ = rows.rows(rows.first + j)
+        first, count = (UInt(x) for x in rows.ranges(rows.first + j))
+        w, share = _between(below, above, 0.0, _tail(c_near))
+        w = sigma * w
+        corner = w * f[0], w * f[1]
+
+        def pair(j: Any, total: Any, sigma: Any, vectors: Any, args: Any, row: Any) -> list[Any]:
+            (x, y), e, row_weight = row
+            v, weight = rows.pairs(first + j)
+            weight, v = row_weight * weight, sigma * v
+            for side in (v, -v):
+                slopes = dr.fma(e[0], side, x), dr.fma(e[1], side, y)
+                total = _add_facet(integrand, total, *slopes, weight, vectors, args)
+            return total
+
+        inner = zeros(), sigma, vectors, args, (corner, e, weight * share)
+        found = _loop("edge pairs", inner, lambda j: j < count, pair)
+        return [a + b for a, b in zip(total, found, strict=True)]
+
+    return _loop("edge rows", (zeros(), *state), lambda j: lanes & (j < rows.count), row)
+
+
+def _sum_wedge(
+    integrand: Callable[..., Any], zeros: Callable[[], Any], state: Any, lanes: Any, rows: _Rows
+) -> list[Any]:
+    """Rows between both edges."""
+    UInt = type(rows.count)
+    middle = rows.count >> 1
+
+    def row(j: Any, total: Any, sigma: Any, vectors: Any, args: Any, c_i: Any, c_r: Any) -> list[Any]:
+        f, e, beyond, lower, upper = _wedge_axes(Geometry(*vectors), c_i, c_r)
+        below, above, weight, reach = rows.rows(rows.first + j)
+        first, count = rows.first + middle - UInt(reach), 2 * UInt(reach) + 1
+        w, share = _between(below, above, 0.0, beyond)
+        ends = _tail(-dr.fma(lower[1], w, lower[0])), _tail(dr.fma(upper[1], w, upper[0]))
+        w = sigma * w
+        corner = w * f[0], w * f[1]
+
+        def node(j: Any, total: Any, sigma: Any, vectors: Any, args: Any, row: Any) -> list[Any]:
+            (x, y), e, row_weight, ends = row
+            below, above, weight, _ = rows.rows(first + j)
+            v, share = _between(below, above, *ends)
+            v = sigma * v
+            slopes = dr.fma(e[0], v, x), dr.fma(e[1], v, y)
+            return _add_facet(integrand, total, *slopes, row_weight * weight * share, vectors, args)
+
+        inner = zeros(), sigma, vectors, args, (corner, e, weight * share, ends)
+        found = _loop("wedge columns", inner, lambda j: j < count, node)
+        return [a + b for a, b in zip(total, found, strict=True)]
+
+    return _loop("wedge rows", (zeros(), *state), lambda j: lanes & (j < rows.count), row)
 
 
 _MILLS_NUMERATOR = (
@@ -498,7 +581,7 @@ def _nearer_edge_axes(geometry: Geometry, c_i: Any, c_r: Any) -> tuple[Any, ...]
 
 
 def _wedge_axes(geometry: Geometry, c_i: Any, c_r: Any) -> tuple[Any, ...]:
-    """Outer axis f, inner axis e, outer limit and the inner limits (constant, slope in the outer variable)."""
+    """Outer axis f, inner axis e, probability beyond the outer limit, inner limits (constant, slope in the outer)."""
     cos_phi, sin_phi = -geometry.s_r[1], geometry.s_r[0]
     cos_d = -cos_phi  # a_i·a_r
     same_side = cos_d >= 0.0
@@ -521,7 +604,7 @@ def _wedge_axes(geometry: Geometry, c_i: Any, c_r: Any) -> tuple[Any, ...]:
     f = (choose(f_same[0], f_opposite[0]), choose(f_same[1], f_opposite[1]))
     e = (choose(e_same[0], e_opposite[0]), choose(e_same[1], e_opposite[1]))
     corner = 0.5 * (c_i + c_r) / dr.maximum(C, 1e-12)
-    w_max = dr.minimum(choose(c_near, corner), _FAR)
+    beyond = _tail(choose(c_near, corner))
     lower = (choose(-_FAR, -c_r / S), choose(0.0, C / S))
     upper = (choose(c_far * inverse, c_i / S), choose(-cos_d * inverse, -C / S))
-    return f, e, w_max, lower, upper
+    return f, e, beyond, lower, upper
