@@ -132,7 +132,7 @@ def test_moments_of_a_clear_wedge(average, jit):
 def limits(sigma, k):
     """Distances of the edges where the default rule changes, for an average by itself."""
     spread, steep = np.sqrt(sigma), 6.0 * abs(k - 1.0) * sigma**1.5
-    return [max(6.9, 32.0 * spread, steep / 0.002), max(5.0, 22.0 * spread, steep / 0.006), 5.0]
+    return [max(6.9, 28.0 * spread, steep / 0.003), max(4.5, 18.5 * spread, steep / 0.01), 4.5]
 
 
 @pytest.mark.parametrize(("sigma", "k"), [(0.03, 1.2), (0.06, 1.2), (0.06, 2.5), (0.1, 0.8), (0.12, 2.5)])
@@ -167,9 +167,9 @@ def test_wedge_distance(jit):
         ("default", 7.0, 10.0, 0.04, 3.0, "twelve"),
         ("default", 10.0, 5.5, 0.04, 1.25, "twelve"),
         ("default", 10.0, 5.1, 0.1, 1.25, "many"),
-        ("default", 10.0, 4.9, 0.04, 1.25, "one_edge"),
-        ("default", 4.9, 10.0, 0.1, 1.25, "one_edge"),
-        ("default", 4.9, 4.9, 0.04, 1.25, "both_edges"),
+        ("default", 10.0, 4.4, 0.04, 1.25, "one_edge"),
+        ("default", 4.4, 10.0, 0.1, 1.25, "one_edge"),
+        ("default", 4.4, 4.4, 0.04, 1.25, "both_edges"),
         ("default", 50.0, 10.0, 0.13, 1.25, "both_edges"),
         ("draft", 4.6, 10.0, 0.1, 3.0, "seven"),
         ("draft", 4.4, 10.0, 0.1, 3.0, "one_edge"),

@@ -74,7 +74,7 @@ class _Accuracy(NamedTuple):
 #: ``draft`` is for searching (errors up to 1 % where the wedge cuts in), ``high`` for reference values, ``fast``
 #: for rendering: a rule of its own, see :mod:`pbrdf.optics.transport`.
 ACCURACIES: dict[str, _Accuracy | None] = {
-    "default": _Accuracy(0.9, 6, (4, 4, 4, 4, 2, 2, 0), (6.9, 5.0, 5.0), 5.0, 0.12, 1.0),
+    "default": _Accuracy(0.9, 6, (4, 4, 4, 4, 2, 2, 0), (6.9, 4.5, 4.5), 4.5, 0.12, 1.0),
     "high": _Accuracy(0.55, 12, (16,) * 8 + (8,) * 5, (1e3, 1e3, 1e3), 7.5, 0.3, 0.0),
     "draft": _Accuracy(1.2, 3, (4, 4, 2, 2), (4.5, 4.5, 4.5), 4.5, 0.12, 0.0),
     "fast": None,
@@ -82,7 +82,7 @@ ACCURACIES: dict[str, _Accuracy | None] = {
 #: Cubatures of the whole plane of 7, 12 and 26 points, rows along the nearer edge, rows between both.
 RULES = ("seven", "twelve", "many", "one_edge", "both_edges")
 #: For 7 and for 12 points: distance over √σ, and steepness times σ^{3/2} over distance, that are just exact enough.
-_CARE = ((32.0, 0.002), (22.0, 0.006))
+_CARE = ((28.0, 0.003), (18.5, 0.01))
 
 
 def _hermite(count: int) -> list[tuple[float, float]]:
@@ -121,43 +121,52 @@ class _Tables(NamedTuple):
     Attributes
     ----------
     ranges_of
-        First row and number of rows by accuracy.
+        First row, number of rows and first pair of columns by accuracy.
     rows
-        Φ(z), 1 − Φ(z), weight, and how far from the middle column a row of the rule for both edges reaches: the corners
-        of the square are left out.
+        Φ(z), 1 − Φ(z), weight, and how many pairs of columns a row of the rule for both edges has: the corners of the
+        square are left out.
+    columns
+        Φ(z) and 1 − Φ(z) of the pairs of columns ±z = ±step/2, ±3 step/2, …, and the weight of each.
     ranges
         First pair of points across a row of the rule for one edge, and number of pairs.
     pairs
         v and the weight of each of the points ±v.
     """
 
-    ranges_of: dict[str, tuple[int, int]]
+    ranges_of: dict[str, tuple[int, int, int]]
     rows: list[tuple[float, ...]]
+    columns: list[tuple[float, ...]]
     ranges: list[tuple[float, ...]]
     pairs: list[tuple[float, ...]]
 
 
 def _row_rules() -> _Tables:
-    tables = _Tables({}, [], [], [])
+    tables = _Tables({}, [], [], [], [])
     first: dict[int, int] = {}
     for name, rule in ACCURACIES.items():
         if rule is None:
             continue
-        tables.ranges_of[name] = len(tables.rows), 2 * rule.half + 1
-        middle = range(-rule.half, rule.half + 1)
-        z = [j * rule.step for j in middle]
-        weights = [math.exp(-0.5 * x * x) for x in z]
-        total = math.fsum(weights)
-        for j, x, weight in zip(middle, z, weights, strict=True):
-            below, above = (0.5 * math.erfc(sign * x / math.sqrt(2.0)) for sign in (-1.0, 1.0))
-            reach = min(rule.half, int(math.sqrt((rule.half + 0.4) ** 2 - j * j)))
-            tables.rows.append((below, above, weight / total, reach))
+        tables.ranges_of[name] = len(tables.rows), 2 * rule.half + 1, len(tables.columns)
+        for j, (below, above, weight) in enumerate(_trapezoid(rule.step, 2 * rule.half + 1), -rule.half):
+            reach = math.sqrt((rule.half + 0.4) ** 2 - j * j)
+            tables.rows.append((below, above, weight, min(rule.half, int(reach + 0.5))))
             count = rule.across[abs(j)]
             if count not in first:
                 first[count] = len(tables.pairs)
                 tables.pairs.extend(_pairs(count))
             tables.ranges.append((first[count], count // 2))
+        columns = _trapezoid(rule.step, 2 * rule.half)
+        tables.columns.extend((*column, 0.0) for column in columns[rule.half :])
     return tables
+
+
+def _trapezoid(step: float, count: int) -> list[tuple[float, float, float]]:
+    """Φ(z), 1 − Φ(z) and weights of equidistant points about 0 for the normal density."""
+    z = [(j - 0.5 * (count - 1)) * step for j in range(count)]
+    weights = [math.exp(-0.5 * x * x) for x in z]
+    total = math.fsum(weights)
+    below, above = ([0.5 * math.erfc(sign * x / math.sqrt(2.0)) for x in z] for sign in (-1.0, 1.0))
+    return [(a, b, w / total) for a, b, w in zip(below, above, weights, strict=True)]
 
 
 _CLEAR, _TWELVE = _clear_rules()
@@ -269,11 +278,9 @@ def facet_average(
         return _transported_average(integrand, size, geometry, sigma, c_i, c_r, args)
 
     # the rule enters as opaque data, so that the accuracies share one kernel
-    first, count = _TABLES.ranges_of[accuracy]
     rows = _Rows(
-        dr.opaque(UInt, first),
-        dr.opaque(UInt, count),
-        *(_packets(F, numbers) for numbers in (_TABLES.rows, _TABLES.ranges, _TABLES.pairs)),
+        *(dr.opaque(UInt, x) for x in _TABLES.ranges_of[accuracy]),
+        *(_packets(F, numbers) for numbers in _TABLES[1:]),
     )
     # as loop state a plain tuple, see Geometry
     state = sigma, tuple(geometry), args
@@ -343,11 +350,17 @@ def _add_pair(
 
 
 def _add_facet(
-    integrand: Callable[..., Any], total: Any, x: Any, y: Any, weight: Any, vectors: Any, args: Any
+    integrand: Callable[..., Any],
+    total: Any,
+    x: Any,
+    y: Any,
+    inverse: Any,
+    weight: Any,
+    vectors: Any,
+    args: Any,
 ) -> list[Any]:
-    """Add a facet of slopes x and y within the wedge."""
+    """Add a facet of slopes x and y within the wedge, 1/√(1 + x² + y²) given."""
     geometry = Geometry(*vectors)
-    inverse = dr.rsqrt(dr.fma(x, x, dr.fma(y, y, 1.0)))
     mu_i = inverse * dr.fma(-x, geometry.sin_i, geometry.cos_i)
     mu_r = inverse * dr.fma(x, geometry.omega_r[0], dr.fma(y, geometry.omega_r[1], geometry.omega_r[2]))
     valid = (mu_i > 0.0) & (mu_r > 0.0)  # but for rounding
@@ -392,11 +405,13 @@ def _sum_clear(
 
 
 class _Rows(NamedTuple):
-    """Rows of an accuracy: the first in the tables, their number, and the tables to look them up."""
+    """Rows of an accuracy: the first in the tables, their number, the first pair of columns, and the tables."""
 
     first: Any
     count: Any
+    first_column: Any
     rows: Callable[[Any], Any]
+    columns: Callable[[Any], Any]
     ranges: Callable[[Any], Any]
     pairs: Callable[[Any], Any]
 
@@ -417,15 +432,17 @@ def _sum_edge(
         corner = w * f[0], w * f[1]
 
         def pair(j: Any, total: Any, sigma: Any, vectors: Any, args: Any, row: Any) -> list[Any]:
-            (x, y), e, row_weight = row
+            (x, y), length2, e, row_weight = row
             v, weight = rows.pairs(first + j)
             weight, v = row_weight * weight, sigma * v
+            # e is perpendicular to (x, y)
+            inverse = dr.rsqrt(dr.fma(v, v, length2))
             for side in (v, -v):
                 slopes = dr.fma(e[0], side, x), dr.fma(e[1], side, y)
-                total = _add_facet(integrand, total, *slopes, weight, vectors, args)
+                total = _add_facet(integrand, total, *slopes, inverse, weight, vectors, args)
             return total
 
-        inner = zeros(), sigma, vectors, args, (corner, e, weight * share)
+        inner = zeros(), sigma, vectors, args, (corner, dr.fma(w, w, 1.0), e, weight * share)
         found = _loop("edge pairs", inner, lambda j: j < count, pair)
         return [a + b for a, b in zip(total, found, strict=True)]
 
@@ -437,27 +454,30 @@ def _sum_wedge(
 ) -> list[Any]:
     """Rows between both edges."""
     UInt = type(rows.count)
-    middle = rows.count >> 1
 
     def row(j: Any, total: Any, sigma: Any, vectors: Any, args: Any, c_i: Any, c_r: Any) -> list[Any]:
         f, e, beyond, lower, upper = _wedge_axes(Geometry(*vectors), c_i, c_r)
         below, above, weight, reach = rows.rows(rows.first + j)
-        first, count = rows.first + middle - UInt(reach), 2 * UInt(reach) + 1
+        count = UInt(reach)
         w, share = _between(below, above, 0.0, beyond)
         ends = _tail(-dr.fma(lower[1], w, lower[0])), _tail(dr.fma(upper[1], w, upper[0]))
         w = sigma * w
         corner = w * f[0], w * f[1]
 
-        def node(j: Any, total: Any, sigma: Any, vectors: Any, args: Any, row: Any) -> list[Any]:
-            (x, y), e, row_weight, ends = row
-            below, above, weight, _ = rows.rows(first + j)
-            v, share = _between(below, above, *ends)
-            v = sigma * v
-            slopes = dr.fma(e[0], v, x), dr.fma(e[1], v, y)
-            return _add_facet(integrand, total, *slopes, row_weight * weight * share, vectors, args)
+        def pair(j: Any, total: Any, sigma: Any, vectors: Any, args: Any, row: Any) -> list[Any]:
+            (x, y), length2, e, row_weight, ends = row
+            below, above, weight, _ = rows.columns(rows.first_column + j)
+            for tails in ((below, above), (above, below)):
+                v, share = _between(*tails, *ends)
+                v = sigma * v
+                inverse = dr.rsqrt(dr.fma(v, v, length2))
+                slopes = dr.fma(e[0], v, x), dr.fma(e[1], v, y)
+                node_weight = row_weight * weight * share
+                total = _add_facet(integrand, total, *slopes, inverse, node_weight, vectors, args)
+            return total
 
-        inner = zeros(), sigma, vectors, args, (corner, e, weight * share, ends)
-        found = _loop("wedge columns", inner, lambda j: j < count, node)
+        inner = zeros(), sigma, vectors, args, (corner, dr.fma(w, w, 1.0), e, weight * share, ends)
+        found = _loop("wedge columns", inner, lambda j: j < count, pair)
         return [a + b for a, b in zip(total, found, strict=True)]
 
     return _loop("wedge rows", (zeros(), *state), lambda j: lanes & (j < rows.count), row)
