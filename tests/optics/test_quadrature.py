@@ -164,7 +164,7 @@ def test_wedge_distance(jit):
     ("accuracy", "c_i", "c_r", "sigma", "k", "rule"),
     [
         ("default", 10.0, 7.0, 0.04, 1.25, "seven"),
-        ("default", 7.0, 10.0, 0.04, 3.0, "twelve"),
+        ("default", 7.0, 10.0, 0.05, 4.0, "twelve"),
         ("default", 10.0, 5.5, 0.04, 1.25, "twelve"),
         ("default", 10.0, 5.1, 0.1, 1.25, "many"),
         ("default", 10.0, 4.4, 0.04, 1.25, "one_edge"),

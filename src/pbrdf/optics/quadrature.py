@@ -35,7 +35,7 @@ from pbrdf.optics.geometry import Geometry
 from pbrdf.optics.powers import polynomial
 from pbrdf.optics.transport import transported_rows
 
-__all__ = ["ACCURACIES", "RULES", "choose_rule", "facet_average", "table", "wedge_distance"]
+__all__ = ["ACCURACIES", "CARE", "RULES", "choose_rule", "facet_average", "table", "wedge_distance"]
 
 #: Edges beyond this many standard deviations count as this far.
 _FAR = 50.0
@@ -82,7 +82,7 @@ ACCURACIES: dict[str, _Accuracy | None] = {
 #: Cubatures of the whole plane of 7, 12 and 26 points, rows along the nearer edge, rows between both.
 RULES = ("seven", "twelve", "many", "one_edge", "both_edges")
 #: For 7 and for 12 points: distance over √σ, and steepness times σ^{3/2} over distance, that are just exact enough.
-_CARE = ((28.0, 0.003), (18.5, 0.01))
+CARE = ((28.0, 0.003), (18.5, 0.01))
 
 
 def _hermite(count: int) -> list[tuple[float, float]]:
@@ -219,7 +219,7 @@ def choose_rule(
     root, care = dr.sqrt(sigma), number(rule.care)
     steep = care * steepness * sigma * root
     seven, twelve, many = (number(x) for x in rule.clear)
-    (spread_7, slope_7), (spread_12, slope_12) = _CARE
+    (spread_7, slope_7), (spread_12, slope_12) = CARE
     seven = dr.maximum(seven, dr.maximum(care * spread_7 * root, steep * (1.0 / slope_7)))
     twelve = dr.maximum(twelve, dr.maximum(care * spread_12 * root, steep * (1.0 / slope_12)))
     index: Any = UInt(4)
