@@ -97,21 +97,24 @@ class RuleStructure(ctypes.Structure):
     """``Rule`` of the C++ program."""
 
     _fields_ = [
-        *((name, ctypes.c_double) for name in ("clear_wedge", "sigma_12", "sigma_25", "step", "steepness")),
-        ("half", ctypes.c_int64),
+        (name, ctypes.c_int64 if name in ("half", "four", "two") else ctypes.c_double)
+        for name in numpy_peer.Rule._fields
     ]
 
 
 def default_rule() -> numpy_peer.Rule:
     """Quadrature of pbrdf's default accuracy, for the peers."""
-    wedge = quadrature.ACCURACIES["default"]
+    rule = quadrature.ACCURACIES["default"]
     return numpy_peer.Rule(
-        quadrature.CLEAR_WEDGE,
-        quadrature.SIGMA_12,
-        quadrature.SIGMA_25,
-        wedge.step,
-        wedge.steepness,
-        wedge.half,
+        *rule.clear,
+        rule.far,
+        rule.rough,
+        *quadrature.CARE[0],
+        *quadrature.CARE[1],
+        rule.step,
+        rule.half,
+        rule.across.count(4) - 1,
+        rule.across.count(4) + rule.across.count(2) - 1,
     )
 
 
@@ -222,7 +225,7 @@ def measure(case: Case, count: int, repeat: int, peers: dict[str, Any], threads:
         "sigma": case.sigma,
         "largest_zenith_rad": case.largest,
         "count": count,
-        "wedge_share": float(np.mean(1.0 / np.tan(farther) <= rule.clear_wedge * case.sigma)),
+        "wedge_share": float(np.mean(1.0 / np.tan(farther) <= rule.clear_26 * case.sigma)),
         "first_call_s": first_calls(case, count),
         "threads": {name: 1 if name == "NumPy" else threads for name in functions},
         "best_s": best,

@@ -11,6 +11,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <cstdlib>
+#include <vector>
 
 namespace {
 
@@ -31,30 +33,51 @@ struct Paint {
     double sigma, n, a, k, b, t;
 };
 
-// When to use which rule for the facets, and the trapezoidal rule of the wedge
+// When to use which rule for the facets, and the trapezoidal rule where edges cut in; see the NumPy program
 struct Rule {
-    double clear_wedge;  // the wedge is ignored if both edges are farther out, in standard deviations
-    double sigma_12;     // largest sigma for the 12-point rule
-    double sigma_25;     // largest sigma for the 25-point rule
-    double step;
-    double steepness;
-    int64_t half;
+    double clear_7, clear_12, clear_26, far, rough, spread_7, slope_7, spread_12, slope_12, step;
+    int64_t half, four, two;
 };
 
 struct Node {
     double x, y, weight;
 };
 
-// Stroud's E2(r^2) 7-1 and 5 x 5 Gauss-Hermite, both for the normal density
+// Stroud's E2(r^2) 5-1 and 7-1 and five Gauss-Hermite rows of 4, 6, 6, 6 and 4 points, for the normal density
 struct Cubatures {
-    Node twelve[12];
-    Node twenty_five[25];
+    // positive points of Gauss-Hermite rules of 2, 4 and 6 points, and their weights
+    double points[3][3] = {{1.0}};
+    double weights[3][3] = {{0.5}};
+    Node seven[7], twelve[12], rows[26];
 
     Cubatures() {
-        const double r = std::sqrt(6.0), root5 = std::sqrt(5.0), root10 = std::sqrt(10.0);
+        for (int n : {4, 6}) {
+            for (int i = 0; i < n / 2; ++i) {  // Newton's method on the Hermite polynomial
+                double x = n == 4 ? (i ? 2.33 : 0.74) : (i == 2 ? 3.32 : i ? 1.89 : 0.62), before = 0.0;
+                for (int step = 0; step < 20; ++step) {
+                    double last = 1.0, now = x;
+                    for (int j = 1; j < n; ++j) {
+                        const double next = x * now - j * last;
+                        last = now, now = next;
+                    }
+                    x -= now / (n * last), before = last;
+                }
+                double factorial = 1.0;
+                for (int j = 2; j < n; ++j) factorial *= j;
+                points[n / 2 - 1][i] = x;
+                weights[n / 2 - 1][i] = factorial / (n * before * before);
+            }
+        }
+        const double r = std::sqrt(6.0), root3 = std::sqrt(3.0), root5 = std::sqrt(5.0), root10 = std::sqrt(10.0);
+        int count = 0;
+        seven[count++] = {0.0, 0.0, 0.5};
+        for (double sign : {-1.0, 1.0}) {
+            seven[count++] = {0.0, 2.0 * sign, 1.0 / 12.0};
+            for (double other : {-1.0, 1.0}) seven[count++] = {sign * root3, other, 1.0 / 12.0};
+        }
         const double s = std::sqrt((9.0 - 3.0 * root5) / 4.0), t = std::sqrt((9.0 + 3.0 * root5) / 4.0);
         const double w_s = (5.0 + 2.0 * root5) / 45.0, w_t = (5.0 - 2.0 * root5) / 45.0;
-        int count = 0;
+        count = 0;
         for (double sign : {-1.0, 1.0}) {
             twelve[count++] = {sign * r, 0.0, 1.0 / 36.0};
             twelve[count++] = {0.0, sign * r, 1.0 / 36.0};
@@ -67,8 +90,13 @@ struct Cubatures {
         const double w_inner = (7.0 + 2.0 * root10) / 60.0, w_outer = (7.0 - 2.0 * root10) / 60.0;
         const double node[5] = {-outer, -inner, 0.0, inner, outer};
         const double weight[5] = {w_outer, w_inner, 8.0 / 15.0, w_inner, w_outer};
-        for (int i = 0; i < 5; ++i)
-            for (int j = 0; j < 5; ++j) twenty_five[5 * i + j] = {node[i], node[j], weight[i] * weight[j]};
+        count = 0;
+        for (int i = 0; i < 5; ++i) {
+            const int half = i % 4 ? 3 : 2;
+            for (int j = 0; j < half; ++j)
+                for (double sign : {-1.0, 1.0})
+                    rows[count++] = {node[i], sign * points[half - 1][j], weight[i] * weights[half - 1][j]};
+        }
     }
 };
 
@@ -120,15 +148,74 @@ inline void add_facet(const Geometry& g, const Paint& paint, double x, double y,
     sums.u += W * half * 2.0 * along_p * along_s;
 }
 
-inline double softplus(double x) { return std::max(x, 0.0) + std::log(1.0 + std::exp(-std::abs(x))); }
+// 1 - Phi(x)
+inline double upper_tail(double x) { return 0.5 * std::erfc(x / std::sqrt(2.0)); }
 
-inline double sigmoid(double x) {
-    const double e = std::exp(-std::abs(x));
-    return (x > 0.0 ? 1.0 : e) / (1.0 + e);
+// x > 0 with 1 - Phi(x) = p, by Newton's method on the logarithm, whose curve is nearly a parabola
+inline double inverse_tail(double p) {
+    const double goal = std::log(p);
+    double x = std::sqrt(std::max(-2.0 * (goal - std::log(0.5)), 0.0));
+    for (int step = 0; step < 6; ++step) {
+        const double tail = upper_tail(x);
+        x += (std::log(tail) - goal) * tail * std::sqrt(2.0 * pi) * std::exp(0.5 * x * x);
+    }
+    return x;
 }
 
-// Trapezoidal rule in the wedge x < c_i, -(x cos(phi) + y sin(phi)) < c_r, mapped smoothly onto the plane
-void sum_wedge(const Geometry& g, const Paint& paint, const Rule& rule, double c_i, double c_r, Sums& sums) {
+// Map z, of which Phi(z) and 1 - Phi(z) are given, to Phi^-1[Phi(low) + (Phi(high) - Phi(low)) Phi(z)]
+inline double between(double below, double above, double low, double high, double& share) {
+    const double beyond_low = upper_tail(-low), beyond_high = upper_tail(high);
+    share = std::max(1.0 - beyond_low - beyond_high, 0.0);
+    const double left = beyond_low + share * below, right = beyond_high + share * above;
+    const double x = inverse_tail(std::clamp(std::min(left, right), 1e-18, 0.5));
+    return left < right ? -x : x;
+}
+
+struct Trapezoid {
+    std::vector<double> below, above, weight, place;
+
+    Trapezoid(double step, int64_t count) {
+        double total = 0.0;
+        for (int64_t j = 0; j < count; ++j) {
+            place.push_back(j - 0.5 * (count - 1));
+            const double z = step * place.back();
+            below.push_back(upper_tail(-z)), above.push_back(upper_tail(z)), weight.push_back(std::exp(-0.5 * z * z));
+            total += weight.back();
+        }
+        for (double& w : weight) w /= total;
+    }
+};
+
+// The rule and what follows from it
+struct Tables {
+    Rule rule;
+    Trapezoid rows, columns;
+
+    explicit Tables(const Rule& r) : rule(r), rows(r.step, 2 * r.half + 1), columns(r.step, 2 * r.half) {}
+};
+
+// Rows along the nearer edge, the only one
+void sum_edge(const Geometry& g, const Paint& paint, const Tables& tables, double c_i, double c_r, Sums& sums) {
+    const Rule& rule = tables.rule;
+    const double f_x = c_i <= c_r ? 1.0 : -g.cos_phi, f_y = c_i <= c_r ? 0.0 : -g.sin_phi;
+    for (int64_t row = 0; row <= 2 * rule.half; ++row) {
+        const int64_t from_middle = std::abs(row - rule.half);
+        if (from_middle > rule.two) continue;
+        const int half = from_middle <= rule.four ? 2 : 1;
+        double share;
+        const double w = between(tables.rows.below[row], tables.rows.above[row], -far_edge, std::min(c_i, c_r), share);
+        for (int j = 0; j < half; ++j)
+            for (double sign : {-1.0, 1.0}) {
+                const double v = sign * cubatures.points[half - 1][j];
+                const double weight = tables.rows.weight[row] * share * cubatures.weights[half - 1][j];
+                add_facet(g, paint, f_x * w - f_y * v, f_y * w + f_x * v, weight, sums);
+            }
+    }
+}
+
+// Rows in the wedge x < c_i, -(x cos(phi) + y sin(phi)) < c_r
+void sum_wedge(const Geometry& g, const Paint& paint, const Tables& tables, double c_i, double c_r, Sums& sums) {
+    const Rule& rule = tables.rule;
     double f_x, f_y, e_x, e_y;  // outer and inner axis
     double w_max, low_0, low_1, high_0, high_1;  // w < w_max, low_0 + low_1 w < v < high_0 + high_1 w
     if (g.cos_phi > 0.0) {  // the rays lie on opposite sides: outer axis into the corner, inner axis across
@@ -154,38 +241,47 @@ void sum_wedge(const Geometry& g, const Paint& paint, const Rule& rule, double c
         low_0 = -far_edge, low_1 = 0.0;
         high_0 = std::max(c_i, c_r) * inverse, high_1 = g.cos_phi * inverse;
     }
-    w_max = std::min(w_max, far_edge);
-    const double inv_steepness = 1.0 / rule.steepness;
-    for (int64_t row = -rule.half; row <= rule.half; ++row) {
-        const double z = row * rule.step;
-        const double w = z - softplus(rule.steepness * (z - w_max)) * inv_steepness;
-        const double low = std::clamp(low_0 + low_1 * w, -far_edge, far_edge);
-        const double high = std::max(std::min(high_0 + high_1 * w, far_edge), low);
-        const double row_weight = rule.step * rule.step / (2.0 * pi) * std::exp(-0.5 * w * w) *
-                                  sigmoid(-rule.steepness * (z - w_max)) *
-                                  (1.0 - std::exp(rule.steepness * (low - high)));
-        for (int64_t column = -rule.half; column <= rule.half; ++column) {
-            const double z = column * rule.step;
-            const double below = rule.steepness * (low - z), above = rule.steepness * (z - high);
-            const double v = z + (softplus(below) - softplus(above)) * inv_steepness;
-            const double weight = row_weight * std::exp(-0.5 * v * v) * sigmoid(-below) * sigmoid(-above);
+    const double reach = (rule.half + 0.4) * (rule.half + 0.4);
+    for (int64_t row = 0; row <= 2 * rule.half; ++row) {
+        double share, inner_share;
+        const double w = between(tables.rows.below[row], tables.rows.above[row], -far_edge, w_max, share);
+        const double low = low_0 + low_1 * w, high = high_0 + high_1 * w, place = tables.rows.place[row];
+        for (int64_t j = 0; j < 2 * rule.half; ++j) {
+            if (place * place + tables.columns.place[j] * tables.columns.place[j] > reach) continue;
+            const double v = between(tables.columns.below[j], tables.columns.above[j], low, high, inner_share);
+            const double weight = tables.rows.weight[row] * tables.columns.weight[j] * share * inner_share;
             add_facet(g, paint, f_x * w + e_x * v, f_y * w + e_y * v, weight, sums);
         }
     }
 }
 
+// A cubature of the whole plane, turned to the viewer
+template <int count>
+void sum_clear(const Geometry& g, const Paint& paint, const Node (&nodes)[count], Sums& sums) {
+    for (const Node& n : nodes)
+        add_facet(g, paint, n.y * g.sin_phi - n.x * g.cos_phi, -n.x * g.sin_phi - n.y * g.cos_phi, n.weight, sums);
+}
+
 // Diffuse part, eqs (9)-(13): adds to the first column of f
-void add_diffuse(const Geometry& g, const Paint& paint, const Rule& rule, double* f) {
+void add_diffuse(const Geometry& g, const Paint& paint, const Tables& tables, double* f) {
     const double c_i = g.cos_i / std::max(paint.sigma * g.sin_i, g.cos_i / far_edge);
     const double c_r = g.cos_r / std::max(paint.sigma * g.sin_r, g.cos_r / far_edge);
     Sums sums;
-    if (std::min(c_i, c_r) > rule.clear_wedge && paint.sigma <= rule.sigma_12) {
-        for (const Node& node : cubatures.twelve) add_facet(g, paint, node.x, node.y, node.weight, sums);
-    } else if (std::min(c_i, c_r) > rule.clear_wedge && paint.sigma <= rule.sigma_25) {
-        for (const Node& node : cubatures.twenty_five) add_facet(g, paint, node.x, node.y, node.weight, sums);
-    } else {
-        sum_wedge(g, paint, rule, c_i, c_r, sums);
-    }
+    const Rule& rule = tables.rule;
+    const double nearer = std::min(c_i, c_r), root = std::sqrt(paint.sigma);
+    const double steep = std::abs(paint.k - 1.0) * paint.sigma * root;
+    if (paint.sigma > rule.rough)
+        sum_wedge(g, paint, tables, c_i, c_r, sums);
+    else if (nearer > std::max({rule.clear_7, rule.spread_7 * root, steep / rule.slope_7}))
+        sum_clear(g, paint, cubatures.seven, sums);
+    else if (nearer > std::max({rule.clear_12, rule.spread_12 * root, steep / rule.slope_12}))
+        sum_clear(g, paint, cubatures.twelve, sums);
+    else if (nearer > rule.clear_26)
+        sum_clear(g, paint, cubatures.rows, sums);
+    else if (std::max(c_i, c_r) > rule.far)
+        sum_edge(g, paint, tables, c_i, c_r, sums);
+    else
+        sum_wedge(g, paint, tables, c_i, c_r, sums);
     const double cos_scattering = g.sin_i * g.sin_r * g.cos_phi - g.cos_i * g.cos_r;
     const double f_rpv = paint.a / pi *
                          std::exp((paint.k - 1.0) * std::log((g.cos_i + g.cos_r) * g.cos_i * g.cos_r) +
@@ -242,10 +338,11 @@ void set_specular(const Geometry& g, const Paint& paint, double* f) {
 extern "C" void double_gauss_mueller(int64_t count, const double* theta_i, const double* theta_r,
                                      const double* phi, const Paint* paint, const Rule* rule, int threads,
                                      double* mueller) {
+    const Tables tables(*rule);
 #pragma omp parallel for schedule(dynamic, 1024) num_threads(threads)
     for (int64_t j = 0; j < count; ++j) {
         const Geometry g(theta_i[j], theta_r[j], phi[j]);
         set_specular(g, *paint, mueller + 16 * j);
-        add_diffuse(g, *paint, *rule, mueller + 16 * j);
+        add_diffuse(g, *paint, tables, mueller + 16 * j);
     }
 }

@@ -2,7 +2,7 @@
 
 Written from the equations of the paper and independent of pbrdf's code, for a dielectric coating in
 the readings ``weighted`` and ``flux``. Vectorised over the directions and the facets together, in blocks of
-a size that was found to be the fastest; the three rules for the facets are those of pbrdf's default accuracy.
+a size that was found to be the fastest; the rules for the facets are those of pbrdf's default accuracy.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import ndtr, ndtri
 
 __all__ = ["Paint", "Rule", "mueller"]
 
@@ -32,24 +33,37 @@ class Paint(NamedTuple):
 
 
 class Rule(NamedTuple):
-    """When to use which rule for the facets, and the trapezoidal rule of the wedge.
+    r"""When to use which rule for the facets, and the trapezoidal rule where edges cut in.
 
     Attributes
     ----------
-    clear_wedge
-        The wedge is ignored if both edges are farther out, in standard deviations of slope.
-    sigma_12, sigma_25
-        Largest σ for the 12-point and for the 25-point rule.
-    step, steepness, half
-        Step, steepness of the map, and half the number of nodes an axis.
+    clear_7, clear_12, clear_26
+        Distances of the nearer edge, in standard deviations of slope, beyond which 7, 12 or 26 points do.
+    far
+        Distance beyond which the farther edge is ignored.
+    rough
+        Largest σ for which edges are ignored.
+    spread_7, slope_7, spread_12, slope_12
+        7 and 12 points do only beyond spread·√σ and beyond \|k − 1\| σ^{3/2}/slope.
+    step, half
+        Step, and half the number of nodes an axis.
+    four, two
+        Rows along one edge have four points, up to this one from the middle, then two.
     """
 
-    clear_wedge: float
-    sigma_12: float
-    sigma_25: float
+    clear_7: float
+    clear_12: float
+    clear_26: float
+    far: float
+    rough: float
+    spread_7: float
+    slope_7: float
+    spread_12: float
+    slope_12: float
     step: float
-    steepness: float
     half: int
+    four: int
+    two: int
 
 
 class Directions(NamedTuple):
@@ -72,31 +86,41 @@ def mueller(
 ) -> np.ndarray:
     """Mueller matrices (1/sr) for one-dimensional arrays of angles in radians, shape (N, 4, 4)."""
     result = np.zeros((theta_i.size, 4, 4))
-    points = _cubature(paint, rule)
-    step = BLOCK // points[0].size
+    step = BLOCK // 12
     for start in range(0, theta_i.size, step):
         block = slice(start, start + step)
         angles = (theta_i[block], theta_r[block], phi[block])
         d = Directions(*(f(angle) for angle in angles for f in (np.sin, np.cos)))
         _set_specular(result[block], d, paint)
-        _add_diffuse(result[block], d, paint, rule, points)
+        _add_diffuse(result[block], d, paint, rule)
     return result
 
 
-def _cubature(paint: Paint, rule: Rule) -> tuple[np.ndarray, ...]:
-    """Nodes and weights for the normal density, as columns: Stroud's E2(r²) 7-1 or 5 x 5 Gauss-Hermite."""
-    if paint.sigma <= rule.sigma_12:
-        r = np.sqrt(6.0)
-        s, t = np.sqrt((9.0 - 3.0 * np.sqrt(5.0)) / 4.0), np.sqrt((9.0 + 3.0 * np.sqrt(5.0)) / 4.0)
-        x = np.array([r, -r, 0.0, 0.0, s, s, -s, -s, t, t, -t, -t])
-        y = np.array([0.0, 0.0, r, -r, s, -s, s, -s, t, -t, t, -t])
-        w_s, w_t = (5.0 + 2.0 * np.sqrt(5.0)) / 45.0, (5.0 - 2.0 * np.sqrt(5.0)) / 45.0
-        weight = np.repeat([1.0 / 36.0, w_s, w_t], 4)
-    else:
-        node, w = np.polynomial.hermite_e.hermegauss(5)
-        w /= np.sqrt(2.0 * np.pi)
-        x, y, weight = np.repeat(node, 5), np.tile(node, 5), np.outer(w, w).ravel()
-    return x[:, None], y[:, None], weight[:, None]
+def _cubatures() -> tuple[tuple[np.ndarray, ...], ...]:
+    """Nodes u (against the viewer's azimuth), v and weights for the normal density, as columns.
+
+    Stroud's E2(r²) 5-1 and 7-1, and 5 Gauss-Hermite rows of 4, 6, 6, 6 and 4 points.
+    """
+    root3, r = np.sqrt(3.0), np.sqrt(6.0)
+    seven = np.array([0, 0, 0, *(root3, root3, -root3, -root3)]), np.array([0, 2, -2, *(1, -1, 1, -1)])
+    s, t = np.sqrt((9.0 - 3.0 * np.sqrt(5.0)) / 4.0), np.sqrt((9.0 + 3.0 * np.sqrt(5.0)) / 4.0)
+    x = np.array([r, -r, 0.0, 0.0, s, s, -s, -s, t, t, -t, -t])
+    y = np.array([0.0, 0.0, r, -r, s, -s, s, -s, t, -t, t, -t])
+    w_s, w_t = (5.0 + 2.0 * np.sqrt(5.0)) / 45.0, (5.0 - 2.0 * np.sqrt(5.0)) / 45.0
+    rows = []
+    for u, w in zip(*_hermite(5), strict=True):
+        v, w_v = _hermite(4 if abs(u) > 2.0 else 6)
+        rows.append((np.full(v.size, u), v, w * w_v))
+    return (
+        tuple(a[:, None] for a in (*seven, np.array([0.5, *(1.0 / 12.0,) * 6]))),
+        tuple(a[:, None] for a in (x, y, np.repeat([1.0 / 36.0, w_s, w_t], 4))),
+        tuple(np.concatenate(column)[:, None] for column in zip(*rows, strict=True)),
+    )
+
+
+def _hermite(count: int) -> tuple[np.ndarray, np.ndarray]:
+    x, w = np.polynomial.hermite_e.hermegauss(count)
+    return x, w / w.sum()
 
 
 def _facet_sums(
@@ -150,22 +174,47 @@ def _facet_sums(
     return np.stack([W.sum(0), sin2.sum(0), along_p.sum(0), u.sum(0)])
 
 
-def _softplus(x: np.ndarray) -> np.ndarray:
-    return np.maximum(x, 0.0) + np.log(1.0 + np.exp(-np.abs(x)))
+def _between(z: np.ndarray, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Map z to Φ⁻¹[Φ(low) + (Φ(high) − Φ(low)) Φ(z)]; that point and Φ(high) − Φ(low)."""
+    below, above = ndtr(low), ndtr(-high)
+    share = np.maximum(1.0 - below - above, 0.0)
+    left, right = below + share * ndtr(z), above + share * ndtr(-z)
+    tail = np.clip(np.minimum(left, right), 1e-18, 0.5)
+    return np.copysign(ndtri(tail), left - right), share
 
 
-def _sigmoid(x: np.ndarray) -> np.ndarray:
-    e = np.exp(-np.abs(x))
-    return np.where(x > 0.0, 1.0, e) / (1.0 + e)
+def _trapezoid(step: float, count: int) -> tuple[np.ndarray, np.ndarray]:
+    z = step * (np.arange(count) - 0.5 * (count - 1))
+    w = np.exp(-0.5 * z * z)
+    return z, w / w.sum()
+
+
+def _edge_axis(d: Directions, c_i: np.ndarray, c_r: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Direction of slope across the nearer edge, and whether that is the edge of the lit facets."""
+    nearer_i = c_i <= c_r
+    return np.where(nearer_i, 1.0, -d.cos_phi), np.where(nearer_i, 0.0, -d.sin_phi), nearer_i
+
+
+def _edge_sums(d: Directions, paint: Paint, rule: Rule, c_i: np.ndarray, c_r: np.ndarray) -> np.ndarray:
+    """Rows along the nearer edge, the only one."""
+    f_x, f_y, _ = _edge_axis(d, c_i, c_r)
+    sums = np.zeros((4, c_i.size))
+    rows = np.arange(-rule.half, rule.half + 1)
+    for j, z, weight in zip(rows, *_trapezoid(rule.step, rows.size), strict=True):
+        if abs(j) > rule.two:
+            continue
+        w, share = _between(z, np.full(c_i.size, -FAR), np.minimum(c_i, c_r))
+        v, w_v = (column[:, None] for column in _hermite(4 if abs(j) <= rule.four else 2))
+        sums += _facet_sums(d, paint, f_x * w - f_y * v, f_y * w + f_x * v, weight * share * w_v, clear=False)
+    return sums
 
 
 def _wedge_sums(d: Directions, paint: Paint, rule: Rule, c_i: np.ndarray, c_r: np.ndarray) -> np.ndarray:
-    """Trapezoidal rule in the wedge x < c_i, −(x cosφ + y sinφ) < c_r, mapped smoothly onto the plane."""
+    """Rows in the wedge x < c_i, −(x cosφ + y sinφ) < c_r."""
     # Opposite sides: the outer axis f runs into the corner, the inner axis e across the wedge. Same side: f
     # runs across the nearer edge, the farther one bounds e from above.
     # The wedge is w < w_max, low_0 + low_1 w < v < high_0 + high_1 w.
     opposite = d.cos_phi > 0.0
-    nearer_i = c_i <= c_r
     cos_half = np.sqrt(0.5 * np.where(opposite, 1.0 + d.cos_phi, 1.0))
     sin_half = 0.5 * d.sin_phi / cos_half
     C = np.maximum(np.abs(sin_half), 1e-12)
@@ -173,54 +222,58 @@ def _wedge_sums(d: Directions, paint: Paint, rule: Rule, c_i: np.ndarray, c_r: n
     e_x, e_y = cos_half, sin_half
     sign = np.where(sin_half > 0.0, 1.0, -1.0)
     f_x, f_y = sign * sin_half, -sign * cos_half
-    same_f_x, same_f_y = np.where(nearer_i, 1.0, -d.cos_phi), np.where(nearer_i, 0.0, -d.sin_phi)
+    same_f_x, same_f_y, nearer_i = _edge_axis(d, c_i, c_r)
     turn = np.where((d.sin_phi > 0.0) == nearer_i, -1.0, 1.0)
     e_x, e_y = np.where(opposite, e_x, -turn * same_f_y), np.where(opposite, e_y, turn * same_f_x)
     f_x, f_y = np.where(opposite, f_x, same_f_x), np.where(opposite, f_y, same_f_y)
-    w_max = np.minimum(np.where(opposite, 0.5 * (c_i + c_r) / C, np.minimum(c_i, c_r)), FAR)
+    w_max = np.where(opposite, 0.5 * (c_i + c_r) / C, np.minimum(c_i, c_r))
     low_0, low_1 = np.where(opposite, -c_r / cos_half, -FAR), np.where(opposite, C / cos_half, 0.0)
     high_0 = np.where(opposite, c_i / cos_half, np.maximum(c_i, c_r) * inverse)
     high_1 = np.where(opposite, -C / cos_half, d.cos_phi * inverse)
 
     sums = np.zeros((4, c_i.size))
-    s = rule.steepness
-    z_v = rule.step * np.arange(-rule.half, rule.half + 1)[:, None]
-    for z_w in z_v[:, 0]:
-        excess = s * (z_w - w_max)
-        w = z_w - _softplus(excess) / s
-        low = np.clip(low_0 + low_1 * w, -FAR, FAR)
-        high = np.maximum(np.minimum(high_0 + high_1 * w, FAR), low)
-        row_weight = rule.step**2 / (2.0 * np.pi) * np.exp(-0.5 * w * w)
-        row_weight *= _sigmoid(-excess) * (1.0 - np.exp(s * (low - high)))
-        # softplus and sigmoid of the two edges share their exponentials
-        below, above = s * (low - z_v), s * (z_v - high)
-        e_below, e_above = np.exp(-np.abs(below)), np.exp(-np.abs(above))
-        slope = np.where(below > 0.0, e_below, 1.0) * np.where(above > 0.0, e_above, 1.0)
-        e_below += 1.0
-        e_above += 1.0
-        slope /= e_below * e_above
-        v = z_v + (np.maximum(below, 0.0) - np.maximum(above, 0.0) + np.log(e_below / e_above)) / s
-        weight = row_weight * slope * np.exp(-0.5 * v * v)
-        sums += _facet_sums(d, paint, f_x * w + e_x * v, f_y * w + e_y * v, weight, clear=False)
+    rows = np.arange(-rule.half, rule.half + 1)
+    columns, column_weights = _trapezoid(rule.step, 2 * rule.half)
+    for j, z, weight in zip(rows, *_trapezoid(rule.step, rows.size), strict=True):
+        inside = j * j + (columns / rule.step) ** 2 <= (rule.half + 0.4) ** 2
+        w, share = _between(z, np.full(c_i.size, -FAR), w_max)
+        v, inner_share = _between(columns[inside, None], low_0 + low_1 * w, high_0 + high_1 * w)
+        node_weights = weight * share * inner_share * column_weights[inside, None]
+        sums += _facet_sums(d, paint, f_x * w + e_x * v, f_y * w + e_y * v, node_weights, clear=False)
     return sums
 
 
-def _add_diffuse(
-    f: np.ndarray, d: Directions, paint: Paint, rule: Rule, points: tuple[np.ndarray, ...]
-) -> None:
+def _clear_sums(d: Directions, paint: Paint, points: tuple[np.ndarray, ...]) -> np.ndarray:
+    """A cubature of the whole plane, turned to the viewer."""
+    u, v, weight = points
+    return _facet_sums(
+        d, paint, v * d.sin_phi - u * d.cos_phi, -u * d.sin_phi - v * d.cos_phi, weight, clear=True
+    )
+
+
+def _add_diffuse(f: np.ndarray, d: Directions, paint: Paint, rule: Rule) -> None:
     """Add the diffuse part, eqs (9)-(13), to the first column."""
     c_i = d.cos_i / np.maximum(paint.sigma * d.sin_i, d.cos_i / FAR)
     c_r = d.cos_r / np.maximum(paint.sigma * d.sin_r, d.cos_r / FAR)
-    clear = (np.minimum(c_i, c_r) > rule.clear_wedge) & (paint.sigma <= rule.sigma_25)
-    if clear.all():
-        sums = _facet_sums(d, paint, *points, clear=True)
-    else:
-        sums = np.empty((4, c_i.size))
-        index = np.flatnonzero(clear)
-        if index.size:
-            sums[:, index] = _facet_sums(d.take(index), paint, *points, clear=True)
-        index = np.flatnonzero(~clear)
-        sums[:, index] = _wedge_sums(d.take(index), paint, rule, c_i[index], c_r[index])
+    nearer, farther = np.minimum(c_i, c_r), np.maximum(c_i, c_r)
+    root, steep = np.sqrt(paint.sigma), abs(paint.k - 1.0) * paint.sigma**1.5
+    limits = (
+        max(rule.clear_7, rule.spread_7 * root, steep / rule.slope_7),
+        max(rule.clear_12, rule.spread_12 * root, steep / rule.slope_12),
+        rule.clear_26,
+    )
+    masks = [nearer > limit for limit in limits] + [farther > rule.far]
+    chosen = np.select(masks, range(4), 4) if paint.sigma <= rule.rough else np.full(c_i.size, 4)
+    sums = np.empty((4, c_i.size))
+    for j in np.unique(chosen):
+        index = np.flatnonzero(chosen == j)
+        part, near, other = (
+            (d, c_i, c_r) if index.size == chosen.size else (d.take(index), c_i[index], c_r[index])
+        )
+        if j < 3:
+            sums[:, index] = _clear_sums(part, paint, CUBATURES[j])
+        else:
+            sums[:, index] = (_edge_sums if j == 3 else _wedge_sums)(part, paint, rule, near, other)
     shape, intensity, q, u = sums
     cos_scattering = d.sin_i * d.sin_r * d.cos_phi - d.cos_i * d.cos_r
     f_rpv = (paint.a / np.pi) * np.exp(
@@ -230,6 +283,9 @@ def _add_diffuse(
     f[:, 0, 0] += f_rpv * (1.0 - paint.t) + polarised * intensity
     f[:, 1, 0] += polarised * q
     f[:, 2, 0] += polarised * u
+
+
+CUBATURES = _cubatures()
 
 
 def _set_specular(f: np.ndarray, d: Directions, paint: Paint) -> None:

@@ -9,7 +9,7 @@ from scipy.integrate import dblquad
 import independent as ref
 from pbrdf.optics.diffuse import minnaert_shape
 from pbrdf.optics.geometry import geometry_from_angles
-from pbrdf.optics.quadrature import facet_average, needs_wedge, wedge_distance
+from pbrdf.optics.quadrature import RULES, choose_rule, facet_average, wedge_distance
 
 #: θ_i, θ_r, φ in degrees, σ, k: both rays near grazing on the same and on opposite sides, rough, nearly flat
 HARD = [
@@ -38,7 +38,8 @@ def average(jit):
             jit(np.broadcast_to(x, (size,))) for x in (theta_i, theta_r, phi, sigma, k)
         )
         g = geometry_from_angles(theta_i, theta_r, phi)
-        return np.array([x.numpy() for x in facet_average(integrand, 4, g, sigma, (k,), accuracy)])
+        steepness = 6.0 * abs(k - 1.0)
+        return np.array([x.numpy() for x in facet_average(integrand, 4, g, sigma, (k,), accuracy, steepness)])
 
     return function
 
@@ -128,24 +129,57 @@ def test_moments_of_a_clear_wedge(average, jit):
         np.testing.assert_allclose(found, expected, atol=1e-14)
 
 
-def test_choice_of_rule_is_continuous(average):
-    """Across the border between the small cubature and the mapped wedge the result does not jump."""
-    for sigma, k in ((0.06, 1.2), (0.12, 2.5)):
-        border = np.arctan(1 / (4.5 * sigma))
-        theta = border + np.array([-1e-7, 1e-7])
-        found = average(theta, 0.3, 2.0, sigma, k)
-        np.testing.assert_allclose(found[:, 0], found[:, 1], atol=2e-5 * abs(found[1, 0]))
-    for border in (0.06, 0.12):
-        found = average(0.5, 0.4, 2.0, border + np.array([-1e-9, 1e-9]), 2.0)
-        np.testing.assert_allclose(found[:, 0], found[:, 1], atol=2e-6)
+def limits(sigma, k):
+    """Distances of the edges where the default rule changes, for an average by itself."""
+    spread, steep = np.sqrt(sigma), 6.0 * abs(k - 1.0) * sigma**1.5
+    return [max(6.9, 28.0 * spread, steep / 0.003), max(4.5, 18.5 * spread, steep / 0.01), 4.5]
 
 
-def test_wedge_distance_and_choice(jit):
-    """Edges are cotθ/σ standard deviations out; grazing or rough surfaces take the wedge."""
+@pytest.mark.parametrize(("sigma", "k"), [(0.03, 1.2), (0.06, 1.2), (0.06, 2.5), (0.1, 0.8), (0.12, 2.5)])
+def test_choice_of_rule_is_continuous(average, sigma, k):
+    """Across the borders between the rules the result does not jump."""
+    for limit in limits(sigma, k):
+        for other in (0.3, np.arctan(1.0 / (limit * sigma)) - 0.001):
+            theta = np.arctan(1.0 / (limit * sigma)) + np.array([-1e-7, 1e-7])
+            found = average(theta, other, 2.0, sigma, k)
+            scale = np.array([found[0, 0], *(found[1, 0],) * 3])
+            assert np.all(abs(found[:, 0] - found[:, 1]) <= 2e-5 * scale)
+
+
+def test_choice_of_rule_is_continuous_in_the_slopes(average):
+    """From σ = 0.12 on no edge is ignored."""
+    found = average(0.5, 0.4, 2.0, 0.12 + np.array([-1e-9, 1e-9]), 2.0)
+    np.testing.assert_allclose(found[:, 0], found[:, 1], atol=2e-6)
+
+
+def test_wedge_distance(jit):
+    """Edges are cotθ/σ standard deviations out."""
     theta = np.radians([0.0, 30.0, 80.0, 89.9])
     found = wedge_distance(jit(np.cos(theta)), jit(np.sin(theta)), jit(np.full(4, 0.1))).numpy()
     np.testing.assert_allclose(found[1:], 1 / np.tan(theta[1:]) / 0.1, rtol=1e-12)
     assert found[0] == 50.0
-    assert needs_wedge(jit(10.0), jit(4.4), jit(0.04)).numpy()[0]
-    assert needs_wedge(jit(10.0), jit(10.0), jit(0.13)).numpy()[0]
-    assert not needs_wedge(jit(10.0), jit(4.6), jit(0.04)).numpy()[0]
+
+
+@pytest.mark.parametrize(
+    ("accuracy", "c_i", "c_r", "sigma", "k", "rule"),
+    [
+        ("default", 10.0, 7.0, 0.04, 1.25, "seven"),
+        ("default", 7.0, 10.0, 0.05, 4.0, "twelve"),
+        ("default", 10.0, 5.5, 0.04, 1.25, "twelve"),
+        ("default", 10.0, 5.1, 0.1, 1.25, "many"),
+        ("default", 10.0, 4.4, 0.04, 1.25, "one_edge"),
+        ("default", 4.4, 10.0, 0.1, 1.25, "one_edge"),
+        ("default", 4.4, 4.4, 0.04, 1.25, "both_edges"),
+        ("default", 50.0, 10.0, 0.13, 1.25, "both_edges"),
+        ("draft", 4.6, 10.0, 0.1, 3.0, "seven"),
+        ("draft", 4.4, 10.0, 0.1, 3.0, "one_edge"),
+        ("high", 50.0, 50.0, 0.01, 1.0, "one_edge"),
+        ("high", 7.4, 7.4, 0.01, 1.0, "both_edges"),
+    ],
+)
+def test_choice_of_rule(jit, accuracy, c_i, c_r, sigma, k, rule):
+    """Far edges, fine facets and flat integrands take few nodes."""
+    steepness = abs(k - 1.0)
+    assert RULES[choose_rule(c_i, c_r, sigma, steepness, accuracy)] == rule
+    arrays = (jit(x) for x in (c_i, c_r, sigma, steepness))
+    assert RULES[choose_rule(*arrays, accuracy)[0]] == rule

@@ -124,13 +124,17 @@ class Model:
         """The same model, evaluated as a renderer does where a scene does not state the accuracy."""
         return self
 
-    def lane_groups(self, scalars: Mapping[str, Any], size: int, part: str) -> Sequence[np.ndarray | None]:
+    def lane_groups(
+        self, scalars: Mapping[str, Any], floats: Mapping[str, Any], size: int, part: str
+    ) -> Sequence[tuple[Self, Any]]:
         """Directions sorted so that those evaluated together take the same branches of the kernel.
 
         Parameters
         ----------
         scalars
             Angles and parameters by name: NumPy arrays of shape (size,), or single numbers.
+        floats
+            The same as Dr.Jit arrays, or single numbers.
         size
             Number of directions.
         part
@@ -139,9 +143,10 @@ class Model:
         Returns
         -------
         sequence
-            Indices (uint32) of each group; None stands for all directions in their order.
+            For each group the model that evaluates it, this one or a copy that knows which branch is taken, and the
+            directions' indices (Dr.Jit uint32); None stands for all directions in their order.
         """
-        return [None]
+        return [(self, None)]
 
     @classmethod
     def fit_bounds(cls, parameter: Parameter, options: Mapping[str, str]) -> tuple[float, float]:

@@ -9,8 +9,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from copy import copy
 from typing import Any, ClassVar, Self
 
+import drjit as dr
 import numpy as np
 
 from pbrdf.errors import ModelError
@@ -22,11 +24,12 @@ from pbrdf.optics.facet_reflection import facet_reflection, tan2_tilt
 from pbrdf.optics.facets import projected_area_density
 from pbrdf.optics.fresnel import mueller_reflection
 from pbrdf.optics.geometry import Geometry
-from pbrdf.optics.quadrature import ACCURACIES, CLEAR_WEDGE, SIGMA_25
+from pbrdf.optics.quadrature import ACCURACIES, RULES, choose_rule, wedge_distance
 from pbrdf.optics.shadowing import SHADOWING
 from pbrdf.optics.transmission import (
     NORMALIZATIONS,
     TRANSMITTANCES,
+    average_steepness,
     exit_and_entry_polarisation,
     exit_polarisation,
 )
@@ -88,6 +91,8 @@ _ACCURACY = Option(
     "fast for rendering, see docs/model.md, section 4",
 )
 
+#: Fewer directions than this are not worth a kernel for each rule of the average over the facets.
+_FEW = 2048
 #: Up to this slope standard deviation a renderer averages over the facets with accuracy ``fast``.
 FAST_SIGMA = 0.06
 #: Bounds of a fit for normalization="visible", whose average diverges for k ≤ 1/3.
@@ -125,26 +130,47 @@ class _GaussianFacets(Model):
     )
     gaussian_slopes: ClassVar[bool] = True
     ablations: ClassVar[Mapping[str, Mapping[str, float]]] = {"unpolarised body": {"t": 0.0}}
+    #: The rule by which all directions average over the facets, None where each takes its own.
+    facet_rule: str | None = None
 
     def for_rendering(self) -> Self:
         """``fast`` where that is exact enough."""
         smooth = np.max(self.lobe_width()) <= FAST_SIGMA
         return self.with_accuracy("fast" if smooth else "default")
 
-    def lane_groups(self, scalars: Mapping[str, Any], size: int, part: str) -> Sequence[np.ndarray | None]:
-        """Directions whose average over the facets takes the mapped wedge apart from the others."""
-        if part == "specular" or self.chosen["accuracy"] in ("high", "fast"):
-            return [None]
-        sigma = np.asarray(scalars["sigma"])
-        # zenith angle up to which the edge of the wedge lies farther out than CLEAR_WEDGE
-        limit = np.where(sigma <= SIGMA_25, np.arctan2(1.0, CLEAR_WEDGE * sigma), -1.0)
-        if all(np.max(scalars[name]) < np.min(limit) for name in ("theta_i", "theta_r")):
-            return [None]
-        wedge = np.maximum(scalars["theta_i"], scalars["theta_r"]) >= limit
-        wedge = np.broadcast_to(wedge, (size,))
-        if wedge.all() or not wedge.any():
-            return [None]
-        return [np.flatnonzero(~wedge).astype(np.uint32), np.flatnonzero(wedge).astype(np.uint32)]
+    def lane_groups(
+        self, scalars: Mapping[str, Any], floats: Mapping[str, Any], size: int, part: str
+    ) -> Sequence[tuple[Self, Any]]:
+        """Directions by the rule of the average over the facets."""
+        accuracy = self.chosen["accuracy"]
+        if part == "specular" or accuracy == "fast":
+            return [(self, None)]
+        normalization = self.chosen.get("normalization", "weighted")
+
+        def rule(theta_i: Any, theta_r: Any, sigma: Any, k: Any) -> Any:
+            c_i, c_r = (wedge_distance(dr.cos(theta), dr.sin(theta), sigma) for theta in (theta_i, theta_r))
+            return choose_rule(c_i, c_r, sigma, average_steepness(k, normalization), accuracy)
+
+        # the rule goes up with each of these
+        names = "theta_i", "theta_r", "sigma"
+        low, high = ([float(f(scalars[name])) for name in names] for f in (np.min, np.max))
+        k = [float(f(scalars["k"])) for f in (np.min, np.max)]
+        first = rule(*low, min(max(1.0, k[0]), k[1]))
+        last = rule(*high, max(k, key=lambda x: abs(x - 1.0)))
+        if first == last:
+            return [(self._with_rule(first), None)]
+        if size < _FEW:
+            return [(self, None)]
+        found = rule(*(floats[name] for name in (*names, "k")))
+        dr.eval(found)
+        groups = [(self._with_rule(j), dr.compress(found == j)) for j in range(first, last + 1)]
+        return [(model, lanes) for model, lanes in groups if len(lanes)]
+
+    def _with_rule(self, index: int) -> Self:
+        """The same model for directions that all take one rule."""
+        other = copy(self)
+        object.__setattr__(other, "facet_rule", RULES[index])
+        return other
 
     def lobe_width(self, values: Mapping[str, Any] | None = None) -> Any:
         """σ."""
@@ -216,6 +242,7 @@ class DoubleGauss(_GaussianFacets):
             self.chosen["normalization"],
             self.chosen["transmittance"],
             self.chosen["accuracy"],
+            self.facet_rule,
         )
         t = values["t"]
         polarised = f_rpv * t
@@ -242,7 +269,9 @@ class ReciprocalDoubleGauss(_GaussianFacets):
             f = specular_reflection(geometry, sigma, n, kappa, self.chosen["shadowing"])
         if part != "specular":
             f_rpv = mrpv(geometry.cos_i, geometry.cos_r, geometry.cos_scattering, values["a"], k, values["b"])
-            block = exit_and_entry_polarisation(geometry, sigma, n, kappa, k, self.chosen["accuracy"])
+            block = exit_and_entry_polarisation(
+                geometry, sigma, n, kappa, k, self.chosen["accuracy"], self.facet_rule
+            )
             polarised = f_rpv * t
             f[0][0] = f[0][0] + (f_rpv - polarised)
             for i in range(3):

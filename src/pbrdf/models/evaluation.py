@@ -53,8 +53,8 @@ class Evaluable(Protocol):
     def kernel(self, geometry: Geometry, values: Mapping[str, Any], part: str = "total") -> Matrix: ...
 
     def lane_groups(
-        self, scalars: Mapping[str, Any], size: int, part: str
-    ) -> Sequence[np.ndarray | None]: ...
+        self, scalars: Mapping[str, Any], floats: Mapping[str, Any], size: int, part: str
+    ) -> Sequence[tuple[Evaluable, Any]]: ...
 
 
 def kernel_from_angles(model: Evaluable, theta_i: Any, theta_r: Any, phi: Any, values: Any, part: str) -> Any:
@@ -244,8 +244,8 @@ def _evaluate_numpy(
         piece = {k: (v if isinstance(v, float) else v[start:stop]) for k, v in flat.items()}
         inputs = {k: backend.upload(backend.Float, v) for k, v in piece.items() if not isinstance(v, float)}
         out = dr.empty(backend.Float, (stop - start) * width)
-        for lanes in model.lane_groups(piece, stop - start, part):
-            _launch(model, backend, piece, inputs, lanes, stop - start, absent, part, function, out)
+        for group, lanes in model.lane_groups(piece, piece | inputs, stop - start, part):
+            _launch(group, backend, piece, inputs, lanes, stop - start, absent, part, function, out)
         if total <= CHUNK:
             result = out.numpy().reshape(-1, width)  # Dr.Jit's memory, not a copy
         else:
@@ -266,7 +266,7 @@ def _launch(
     backend: Backend,
     scalars: dict[str, Any],
     inputs: dict[str, Any],
-    lanes: np.ndarray | None,
+    lanes: Any,
     size: int,
     absent: Sequence[str],
     part: str,
@@ -277,7 +277,7 @@ def _launch(
     import drjit as dr
 
     Float, UInt32 = backend.Float, backend.UInt32
-    index = dr.arange(UInt32, size) if lanes is None else backend.upload(UInt32, lanes)
+    index = dr.arange(UInt32, size) if lanes is None else lanes
 
     def fetch(name: str) -> Any:
         # scalars are opaque, so that a new value does not mean a new kernel

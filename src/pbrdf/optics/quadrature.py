@@ -4,15 +4,19 @@ P dω is exactly a Gaussian density in the facet's two slopes (docs/model.md, se
 the facets is E[g(x, y); lit and seen] with m ∝ (x, y, 1) and x, y ~ N(0, σ²). "Lit" and "seen" are two
 half-planes in slope space, at c_i = cotθ_i/σ and c_r = cotθ_r/σ standard deviations from the origin.
 
-* Where both are far out (the paints below about 75°) a small cubature for the full Gaussian plane is
-  enough: 12 points of degree 7 (Stroud, *Approximate Calculation of Multiple Integrals*, E2^{r²} 7-1) for
-  σ ≤ 0.045, 5 x 5 Gauss-Hermite points for σ ≤ 0.12.
-* Elsewhere the wedge between the two half-planes is mapped smoothly onto the whole plane and the
-  trapezoidal rule is used there, which converges exponentially for analytic integrands, with algebraic
-  singularities at the edges of the wedge included: the map bends with softplus functions at the edges, so
-  that it is the identity inside. Axes are chosen so that the limits of the inner integral are linear and
-  do not cross inside the wedge: for rays on opposite sides (φ near 0) the inner axis runs across the wedge
-  and the outer axis into its corner; for rays on the same side the outer axis runs across the nearer edge.
+* Where both are far out a small cubature for the full Gaussian plane is enough: Stroud's E2^{r²} 5-1 of 7 points and
+  7-1 of 12 (*Approximate Calculation of Multiple Integrals*), or 26 points, Gauss-Hermite by Gauss-Hermite. How far
+  out is enough depends on σ and on how steeply the integrand changes. The points come in rows across the slope
+  towards the viewer, two at a time, which therefore share the local exit angle.
+* Where only the nearer edge cuts in, rows of Gauss-Hermite points run along it.
+* Elsewhere the wedge between the two half-planes is mapped onto the whole plane. Axes are chosen so that the limits
+  of the inner integral are linear and do not cross inside the wedge: for rays on opposite sides (φ near 0) the inner
+  axis runs across the wedge and the outer axis into its corner; for rays on the same side the outer axis runs across
+  the nearer edge.
+
+A variable that an edge cuts off is mapped onto a normal one, x = Φ⁻¹[Φ(low) + (Φ(high) − Φ(low)) Φ(z)], and z is
+summed over by the trapezoidal rule, which converges exponentially for analytic integrands, with algebraic
+singularities at the edges included: there 1 − Φ(z) falls off as a Gaussian. Well inside, the map is the identity.
 
 The rule is chosen for each lane of the computation apart.
 """
@@ -20,79 +24,177 @@ The rule is chosen for each lane of the computation apart.
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import drjit as dr
+import numpy as np
 
 from pbrdf.optics.geometry import Geometry
+from pbrdf.optics.powers import polynomial
 from pbrdf.optics.summation import differentiated, summed
 from pbrdf.optics.transport import transported_rows
 
-__all__ = ["ACCURACIES", "CLEAR_WEDGE", "facet_average", "needs_wedge", "table", "wedge_distance"]
+__all__ = ["ACCURACIES", "CARE", "RULES", "choose_rule", "facet_average", "table", "wedge_distance"]
 
-#: Distance, in standard deviations of slope, beyond which the edge of the lit and seen wedge is ignored.
-CLEAR_WEDGE = 4.5
-#: Largest σ for the 12-point and for the 25-point rule.
-SIGMA_12, SIGMA_25 = 0.045, 0.12
-#: Bounds beyond this many standard deviations are out of reach of every node.
+#: Edges beyond this many standard deviations count as this far.
 _FAR = 50.0
+#: Bounds beyond this many standard deviations are out of reach of every node.
+_REACH = 9.0
 
 
 class _Accuracy(NamedTuple):
-    """Trapezoidal rule of the mapped wedge, and whether the cubatures of the whole plane are used.
+    """Rules of an accuracy, and where they are used; distances are in standard deviations of slope.
 
-    ``step`` and ``steepness`` of the map are in standard deviations of slope; there are 2·``half`` + 1 nodes
-    an axis.
+    Attributes
+    ----------
+    step, half
+        The trapezoidal rule has 2·``half`` + 1 nodes an axis.
+    across
+        Numbers of nodes, even, in rows along the only near edge: in the middle row, in those beside it, and so on.
+    clear
+        Distances of the nearer edge beyond which it is ignored by the rules of 7, of 12 and of 26 points.
+    far
+        Distance beyond which the farther edge is ignored.
+    rough
+        Largest σ for which edges are ignored.
+    care
+        1 where the distances for 7 and 12 points grow with σ and with the steepness of the integrand, else 0.
     """
 
     step: float
     half: int
-    steepness: float
-    clear: bool = True
+    across: tuple[int, ...]
+    clear: tuple[float, float, float]
+    far: float
+    rough: float
+    care: float
 
 
 #: ``draft`` is for searching (errors up to 1 % where the wedge cuts in), ``high`` for reference values, ``fast``
 #: for rendering: a rule of its own, see :mod:`pbrdf.optics.transport`.
 ACCURACIES: dict[str, _Accuracy | None] = {
-    "default": _Accuracy(0.8, 7, 2.0),
-    "high": _Accuracy(0.3, 24, 4.0, clear=False),
-    "draft": _Accuracy(1.5, 3, 1.3),
+    "default": _Accuracy(0.9, 6, (4, 4, 4, 4, 2, 2, 0), (6.9, 4.5, 4.5), 4.5, 0.12, 1.0),
+    "high": _Accuracy(0.55, 12, (16,) * 8 + (8,) * 5, (1e3, 1e3, 1e3), 7.5, 0.3, 0.0),
+    "draft": _Accuracy(1.2, 3, (4, 4, 2, 2), (4.5, 4.5, 4.5), 4.5, 0.12, 0.0),
     "fast": None,
 }
+#: Cubatures of the whole plane of 7, 12 and 26 points, rows along the nearer edge, rows between both.
+RULES = ("seven", "twelve", "many", "one_edge", "both_edges")
+#: For 7 and for 12 points: distance over √σ, and steepness times σ^{3/2} over distance, that are just exact enough.
+CARE = ((28.0, 0.003), (18.5, 0.01))
 
 
-def _clear_rules() -> tuple[list[float], list[float], list[float]]:
-    """Orbits of four nodes under quarter turns: one node (in standard deviations) and the weight of each.
+def _hermite(count: int) -> list[tuple[float, float]]:
+    """Gauss-Hermite rule for the normal density."""
+    points, weights = np.polynomial.hermite_e.hermegauss(count)
+    return [(float(x), float(w)) for x, w in zip(points, weights / weights.sum(), strict=True)]
 
-    First the three orbits of the 12-point rule, then the seven of the 25-point rule, whose centre counts as
-    an orbit of a quarter of its weight.
-    """
+
+def _pairs(count: int) -> list[tuple[float, float]]:
+    """Positive points of a Gauss-Hermite rule of an even number of points."""
+    if count == 0:
+        return []
+    return [(x, w) for x, w in _hermite(count) if x > 0.0]
+
+
+#: E2^{r²} 5-1 as pairs of points (u, ±v), each of this weight, besides the origin, which has half of the whole.
+_SEVEN = ((0.0, 2.0), (math.sqrt(3.0), 1.0), (-math.sqrt(3.0), 1.0))
+_SEVEN_WEIGHT = 1.0 / 12.0
+
+
+def _clear_rules() -> tuple[list[tuple[float, ...]], list[tuple[int, int]]]:
+    """Rules of 7, 12 and 26 points, pairs (u, ±v) with the weight of each point; where each begins, and its length."""
+    seven = [(0.0, 0.0, 0.25), *((u, v, _SEVEN_WEIGHT) for u, v in _SEVEN)]
     s, t = (math.sqrt((9.0 - sign * 3.0 * math.sqrt(5.0)) / 4.0) for sign in (1.0, -1.0))
-    x, y = [math.sqrt(6.0), s, t], [0.0, s, t]
-    w = [1.0 / 36.0, (5.0 + 2.0 * math.sqrt(5.0)) / 45.0, (5.0 - 2.0 * math.sqrt(5.0)) / 45.0]
-    # Gauss-Hermite, five points, for the normal density: roots of He5 = z(z⁴ − 10z² + 15)
-    inner, outer = math.sqrt(5.0 - math.sqrt(10.0)), math.sqrt(5.0 + math.sqrt(10.0))
-    w_in, w_out = (7.0 + 2.0 * math.sqrt(10.0)) / 60.0, (7.0 - 2.0 * math.sqrt(10.0)) / 60.0
-    axis = [(0.0, 8.0 / 15.0), (inner, w_in), (outer, w_out)]
-    for node_x, weight_x in axis:
-        for node_y, weight_y in axis:
-            if node_x > 0.0 or node_y == 0.0:
-                x.append(node_x)
-                y.append(node_y)
-                w.append(weight_x * weight_y * (0.25 if node_x == 0.0 else 1.0))
-    return x, y, w
+    w_s, w_t = ((5.0 + sign * 2.0 * math.sqrt(5.0)) / 45.0 for sign in (1.0, -1.0))
+    six = math.sqrt(6.0)
+    twelve = [(0.0, six, 1.0 / 36.0), (six, 0.0, 1.0 / 72.0), (-six, 0.0, 1.0 / 72.0)]
+    twelve += [(sign * x, x, w) for x, w in ((s, w_s), (t, w_t)) for sign in (1.0, -1.0)]
+    rows = zip(_hermite(5), (4, 6, 6, 6, 4), strict=True)
+    product = [(u, v, w * w_v) for (u, w), count in rows for v, w_v in _pairs(count)]
+    ranges, pairs = [], []
+    for rule in (seven, twelve, product):
+        ranges.append((len(pairs), len(rule)))
+        pairs.extend((*pair, 0.0) for pair in rule)
+    return pairs, ranges
 
 
-_RULES = _clear_rules()
+class _Tables(NamedTuple):
+    """Trapezoidal rules of all accuracies.
+
+    Attributes
+    ----------
+    ranges_of
+        First row, number of rows and first pair of columns by accuracy.
+    rows
+        Φ(z), 1 − Φ(z), weight, and how many pairs of columns a row of the rule for both edges has: the corners of the
+        square are left out.
+    columns
+        Φ(z) and 1 − Φ(z) of the pairs of columns ±z = ±step/2, ±3 step/2, …, and the weight of each.
+    ranges
+        First pair of points across a row of the rule for one edge, and number of pairs.
+    pairs
+        v and the weight of each of the points ±v.
+    """
+
+    ranges_of: dict[str, tuple[int, int, int]]
+    rows: list[tuple[float, ...]]
+    columns: list[tuple[float, ...]]
+    ranges: list[tuple[float, ...]]
+    pairs: list[tuple[float, ...]]
+
+
+def _row_rules() -> _Tables:
+    tables = _Tables({}, [], [], [], [])
+    first: dict[int, int] = {}
+    for name, rule in ACCURACIES.items():
+        if rule is None:
+            continue
+        tables.ranges_of[name] = len(tables.rows), 2 * rule.half + 1, len(tables.columns)
+        for j, (below, above, weight) in enumerate(_trapezoid(rule.step, 2 * rule.half + 1), -rule.half):
+            reach = math.sqrt((rule.half + 0.4) ** 2 - j * j)
+            tables.rows.append((below, above, weight, min(rule.half, int(reach + 0.5))))
+            count = rule.across[abs(j)]
+            if count not in first:
+                first[count] = len(tables.pairs)
+                tables.pairs.extend(_pairs(count))
+            tables.ranges.append((first[count], count // 2))
+        columns = _trapezoid(rule.step, 2 * rule.half)
+        tables.columns.extend((*column, 0.0) for column in columns[rule.half :])
+    return tables
+
+
+def _trapezoid(step: float, count: int) -> list[tuple[float, float, float]]:
+    """Φ(z), 1 − Φ(z) and weights of equidistant points about 0 for the normal density."""
+    z = [(j - 0.5 * (count - 1)) * step for j in range(count)]
+    weights = [math.exp(-0.5 * x * x) for x in z]
+    total = math.fsum(weights)
+    below, above = ([0.5 * math.erfc(sign * x / math.sqrt(2.0)) for x in z] for sign in (-1.0, 1.0))
+    return [(a, b, w / total) for a, b, w in zip(below, above, weights, strict=True)]
+
+
+_CLEAR, _CLEAR_RANGES = _clear_rules()
+_TABLES = _row_rules()
 
 
 def table(F: type, column: list[float]) -> Callable[..., Any]:
-    """Numbers to look up by index: a function of the index and, if not always wanted, of a mask."""
+    """Numbers to look up by index."""
     if F is float:
-        return lambda index, active=True: column[index]
+        return lambda index: column[index]
     values = F(column)
-    return lambda index, active=True: dr.gather(F, values, index, active)
+    return lambda index: dr.gather(F, values, index)
+
+
+def _packets(F: type, rows: list[tuple[float, ...]]) -> Callable[[Any], Any]:
+    """Rows of two or four numbers to look up by index, faster than one number at a time."""
+    if F is float:
+        return lambda index: rows[index]
+    values = F([x for row in rows for x in row])
+    name = f"Array{len(rows[0])}f" + ("64" if dr.type_v(F) == dr.VarType.Float64 else "")
+    Packet = getattr(sys.modules[F.__module__], name)
+    return lambda index: dr.gather(Packet, values, index)
 
 
 def wedge_distance(cos_theta: Any, sin_theta: Any, sigma: Any) -> Any:
@@ -108,9 +210,41 @@ def _edges(geometry: Geometry, sigma: Any) -> tuple[Any, Any]:
     )
 
 
-def needs_wedge(c_i: Any, c_r: Any, sigma: Any) -> Any:
-    """Tell where the default accuracy takes the mapped wedge instead of a small cubature."""
-    return (dr.minimum(c_i, c_r) <= CLEAR_WEDGE) | (sigma > SIGMA_25)
+def choose_rule(
+    c_i: Any, c_r: Any, sigma: Any, steepness: Any, accuracy: str, number: Callable[[float], Any] = float
+) -> Any:
+    """Tell which of ``RULES`` each lane takes, by index: the farther the edges and the smaller σ, the lower.
+
+    Parameters
+    ----------
+    c_i, c_r, sigma
+        Distances of the edges and slope standard deviation.
+    steepness
+        See :func:`facet_average`.
+    accuracy
+        One of ``ACCURACIES`` other than ``fast``.
+    number
+        How a number of the accuracy enters.
+    """
+    rule = ACCURACIES[accuracy]
+    assert rule is not None
+    UInt = dr.uint32_array_t(type(sigma))
+    nearer, farther = dr.minimum(c_i, c_r), dr.maximum(c_i, c_r)
+    root, care = dr.sqrt(sigma), number(rule.care)
+    steep = care * steepness * sigma * root
+    seven, twelve, many = (number(x) for x in rule.clear)
+    (spread_7, slope_7), (spread_12, slope_12) = CARE
+    seven = dr.maximum(seven, dr.maximum(care * spread_7 * root, steep * (1.0 / slope_7)))
+    twelve = dr.maximum(twelve, dr.maximum(care * spread_12 * root, steep * (1.0 / slope_12)))
+    index: Any = UInt(4)
+    for place, mask in (
+        (3, farther > number(rule.far)),
+        (2, nearer > many),
+        (1, nearer > twelve),
+        (0, nearer > seven),
+    ):
+        index = dr.select(mask, UInt(place), index)
+    return dr.select(sigma <= number(rule.rough), index, UInt(4))
 
 
 def facet_average(
@@ -120,6 +254,8 @@ def facet_average(
     sigma: Any,
     args: tuple[Any, ...],
     accuracy: str = "default",
+    steepness: Any = 1.0,
+    rule: str | None = None,
 ) -> list[Any]:
     """Integrate functions of the facet normal over the lit and seen facets, ∫ P g dω.
 
@@ -136,6 +272,11 @@ def facet_average(
         Differentiable values that the integrand needs: what it captures counts as constant.
     accuracy
         One of ``ACCURACIES``.
+    steepness
+        Size of the exponent of the local cosines' product with which the integrand goes, |k − 1|: where it is small,
+        fewer nodes do. For the ratio of two such integrals; each of them by itself needs six times that.
+    rule
+        The one of ``RULES`` that all lanes take, where it is known: what is compiled is shorter then.
 
     Returns
     -------
@@ -144,95 +285,237 @@ def facet_average(
     """
     F = type(sigma)
     UInt = dr.uint32_array_t(F)
-    c_i, c_r = _edges(geometry, sigma)
-    vectors = tuple(geometry)
+    if accuracy == "fast":
+        return _transported_average(integrand, size, geometry, sigma, args)
+    if rule == "seven":
+        return _seven(integrand, geometry, sigma, args)
 
-    def weighted(m: Any, weight: Any, vectors: Any, args: Any, check: bool) -> list[Any]:
-        geometry = Geometry(*vectors)
-        mu_i = dr.fma(m[0], geometry.omega_i[0], m[2] * geometry.omega_i[2])
-        mu_r = dr.fma(
-            m[0], geometry.omega_r[0], dr.fma(m[1], geometry.omega_r[1], m[2] * geometry.omega_r[2])
-        )
-        if check:
-            valid = (mu_i > 0.0) & (mu_r > 0.0)
-            mu_i, mu_r = dr.select(valid, mu_i, 1.0), dr.select(valid, mu_r, 1.0)
-            weight = dr.select(valid, weight, 0.0)
-        return [weight * value for value in integrand(m, mu_i, mu_r, geometry, args)]
-
-    rule = ACCURACIES[accuracy]
+    index: Any = None
     if rule is None:
-        return _transported_average(integrand, size, geometry, sigma, c_i, c_r, args)
+        index = choose_rule(*_edges(geometry, sigma), sigma, steepness, accuracy, lambda x: dr.opaque(F, x))
+
+    def lanes(name: str) -> Any:
+        return index == RULES.index(name) if rule is None else name == rule
 
     # the rule enters as opaque data, so that the accuracies share one kernel
-    step, steepness = dr.opaque(F, rule.step), dr.opaque(F, rule.steepness)
-    flatness = dr.rcp(steepness)
-    half, axis_nodes = dr.opaque(F, float(rule.half)), dr.opaque(UInt, 2 * rule.half + 1)
-    wedge_lanes = needs_wedge(c_i, c_r, sigma) | (dr.opaque(UInt, int(rule.clear)) == 0)
-    narrow = sigma <= SIGMA_12
-    offset = dr.select(narrow, UInt(0), UInt(3))
-    count = dr.select(wedge_lanes, UInt(0), dr.select(narrow, UInt(3), UInt(7)))
-    nodes = [table(F, column) for column in _RULES]
+    rows = _Rows(
+        *(dr.opaque(UInt, x) for x in _TABLES.ranges_of[accuracy]),
+        *(_packets(F, numbers) for numbers in _TABLES[1:]),
+    )
+    state = sigma, tuple(geometry), args
+    sums = []
+    if rule in (None, "twelve", "many"):
+        sums.append(_sum_clear(integrand, size, state, [lanes(name) for name in RULES[:3]]))
+    if rule in (None, "one_edge"):
+        sums.append(_sum_edge(integrand, size, state, lanes("one_edge"), rows))
+    if rule in (None, "both_edges"):
+        sums.append(_sum_wedge(integrand, size, state, lanes("both_edges"), rows))
+    return _added(*sums)
 
-    def quarter_turns(j: Any, sigma: Any, vectors: Any, args: Any) -> list[Any]:
-        x, y, weight = (node(offset + j, j < count) for node in nodes)
-        mx, my = x * sigma, y * sigma
-        inverse = dr.rsqrt(dr.fma(mx, mx, dr.fma(my, my, 1.0)))
-        mx, my = mx * inverse, my * inverse
-        turned = [
-            weighted((m_x, m_y, inverse), weight, vectors, args, False)
-            for m_x, m_y in ((mx, my), (-my, mx), (-mx, -my), (my, -mx))
-        ]
-        return [a + b + c + d for a, b, c, d in zip(*turned, strict=True)]
 
-    clear = summed(quarter_turns, count, size, (sigma, vectors, args), label="facets")
+def _pair(
+    integrand: Callable[..., Any], u: Any, v: Any, inverse: Any, weight: Any, vectors: Any, args: Any
+) -> list[Any]:
+    """Two facets of slope u towards the viewer and ±v across, 1/√(1 + u² + v²) given: both see the same exit angle."""
+    geometry = Geometry(*vectors)
+    cos_phi, sin_phi = -geometry.s_r[1], geometry.s_r[0]
+    mu_r = inverse * dr.fma(-u, geometry.sin_r, geometry.cos_r)
+    sides = []
+    for side in (v, -v):
+        x, y = dr.fma(-u, cos_phi, side * sin_phi), dr.fma(-u, sin_phi, -side * cos_phi)
+        mu_i = inverse * dr.fma(-x, geometry.sin_i, geometry.cos_i)
+        sides.append(integrand((x * inverse, y * inverse, inverse), mu_i, mu_r, geometry, args))
+    return [weight * (a + b) for a, b in zip(*sides, strict=True)]
+
+
+def _facet(
+    integrand: Callable[..., Any], x: Any, y: Any, inverse: Any, weight: Any, vectors: Any, args: Any
+) -> list[Any]:
+    """A facet of slopes x and y within the wedge, 1/√(1 + x² + y²) given."""
+    geometry = Geometry(*vectors)
+    mu_i = inverse * dr.fma(-x, geometry.sin_i, geometry.cos_i)
+    mu_r = inverse * dr.fma(x, geometry.omega_r[0], dr.fma(y, geometry.omega_r[1], geometry.omega_r[2]))
+    valid = (mu_i > 0.0) & (mu_r > 0.0)  # but for rounding
+    mu_i, mu_r = dr.select(valid, mu_i, 1.0), dr.select(valid, mu_r, 1.0)
+    weight = dr.select(valid, weight, 0.0)
+    values = integrand((x * inverse, y * inverse, inverse), mu_i, mu_r, geometry, args)
+    return [weight * value for value in values]
+
+
+def _added(*values: list[Any]) -> list[Any]:
+    return [sum(x[1:], x[0]) for x in zip(*values, strict=True)]
+
+
+def _seven(integrand: Callable[..., Any], geometry: Geometry, sigma: Any, args: Any) -> list[Any]:
+    """Seven points of the whole plane in all lanes, without a loop: six of them have the same length."""
+    inverse = dr.rsqrt(dr.fma(4.0 * sigma, sigma, 1.0))
+    flat = integrand((0.0, 0.0, 1.0), geometry.cos_i, geometry.cos_r, geometry, args)
+    pairs = [
+        _pair(integrand, sigma * u, sigma * v, inverse, _SEVEN_WEIGHT, tuple(geometry), args)
+        for u, v in _SEVEN
+    ]
+    return _added([0.5 * value for value in flat], *pairs)
+
+
+def _sum_clear(integrand: Callable[..., Any], size: int, state: Any, lanes: list[Any]) -> list[Any]:
+    """Pairs of points of the whole plane; ``lanes`` of each of the rules."""
+    F = type(state[0])
+    UInt = dr.uint32_array_t(F)
+    points = _packets(F, _CLEAR)
+    start, count = UInt(0), UInt(0)
+    for mask, (first, length) in zip(lanes, _CLEAR_RANGES, strict=True):
+        start, count = dr.select(mask, UInt(first), start), dr.select(mask, UInt(length), count)
+
+    def pair(j: Any, sigma: Any, vectors: Any, args: Any) -> list[Any]:
+        u, v, weight, _ = points(start + j)
+        u, v = sigma * u, sigma * v
+        inverse = dr.rsqrt(dr.fma(u, u, dr.fma(v, v, 1.0)))
+        return _pair(integrand, u, v, inverse, weight, vectors, args)
+
+    return summed(pair, count, size, state, label="facets")
+
+
+class _Rows(NamedTuple):
+    """Rows of an accuracy: the first in the tables, their number, the first pair of columns, and the tables."""
+
+    first: Any
+    count: Any
+    first_column: Any
+    rows: Callable[[Any], Any]
+    columns: Callable[[Any], Any]
+    ranges: Callable[[Any], Any]
+    pairs: Callable[[Any], Any]
+
+
+# The edges and axes are found anew in each row: other lanes never enter there, and their derivatives are those by what
+# they depend on.
+
+
+def _sum_edge(integrand: Callable[..., Any], size: int, state: Any, lanes: Any, rows: _Rows) -> list[Any]:
+    """Rows along the nearer edge."""
+    UInt = type(rows.count)
 
     def row(j: Any, sigma: Any, vectors: Any, args: Any) -> list[Any]:
-        # the axes are found anew in each row: their derivatives are then those by what they depend on
-        f, e, w_max, lower, upper = _wedge_axes(Geometry(*vectors), sigma)
-        w, dw = _squeeze_below((F(j) - half) * step, w_max, steepness, flatness)
-        low = dr.clip(dr.fma(lower[1], w, lower[0]), -_FAR, _FAR)
-        high = dr.maximum(dr.minimum(dr.fma(upper[1], w, upper[0]), _FAR), low)
-        # (1 − exp(low − high)): with it the derivative of the map has no cancellation in a narrow interval
-        narrowness = 1.0 - dr.exp(steepness * (low - high))
-        row_weight = (step * step * (0.5 / math.pi)) * dr.exp(-0.5 * w * w) * dw * narrowness
+        geometry = Geometry(*vectors)
+        (f, e), c_near, *_ = _nearer_edge_axes(geometry, *_edges(geometry, sigma))
+        below, above, weight, _ = rows.rows(rows.first + j)
+        first, count = (UInt(x) for x in rows.ranges(rows.first + j))
+        w, share = _between(below, above, 0.0, _tail(c_near))
+        w = sigma * w
 
-        def column(j: Any, sigma: Any, vectors: Any, args: Any, axes: Any, limits: Any) -> list[Any]:
-            f, e = axes
-            w, low, high, row_weight = limits
-            v, dv = _squeeze_between((F(j) - half) * step, low, high, steepness, flatness)
-            weight = row_weight * dv * dr.exp(-0.5 * v * v)
-            x, y = sigma * dr.fma(f[0], w, e[0] * v), sigma * dr.fma(f[1], w, e[1] * v)
-            inverse = dr.rsqrt(dr.fma(x, x, dr.fma(y, y, 1.0)))
-            return weighted((x * inverse, y * inverse, inverse), weight, vectors, args, True)
+        def pair(j: Any, sigma: Any, vectors: Any, args: Any, row: Any) -> list[Any]:
+            (x, y), length2, e, row_weight = row
+            v, weight = rows.pairs(first + j)
+            weight, v = row_weight * weight, sigma * v
+            # e is perpendicular to (x, y)
+            inverse = dr.rsqrt(dr.fma(v, v, length2))
+            sides = ((dr.fma(e[0], side, x), dr.fma(e[1], side, y)) for side in (v, -v))
+            return _added(*(_facet(integrand, *slopes, inverse, weight, vectors, args) for slopes in sides))
 
-        by = differentiated((sigma, vectors, args))
-        state = (sigma, vectors, args, (f, e), (w, low, high, row_weight))
-        return summed(column, axis_nodes, size, state, by, label="wedge columns")
+        inner = sigma, vectors, args, ((w * f[0], w * f[1]), dr.fma(w, w, 1.0), e, weight * share)
+        return summed(pair, count, size, inner, differentiated((sigma, vectors, args)), "edge pairs")
 
-    rows = dr.select(wedge_lanes, axis_nodes, 0)
-    wedge = summed(row, rows, size, (sigma, vectors, args), label="wedge rows")
-    return [a + b for a, b in zip(clear, wedge, strict=True)]
+    return summed(row, dr.select(lanes, rows.count, UInt(0)), size, state, label="edge rows")
 
 
-def _squeeze_below(z: Any, high: Any, steepness: Any, flatness: Any) -> tuple[Any, Any]:
-    """Map z ∈ ℝ smoothly onto (−∞, high), the identity well inside; return the point and the derivative."""
-    above = steepness * (z - high)
-    e = dr.exp(-dr.abs(above))
-    one_e = 1.0 + e
-    point = z - (dr.maximum(above, 0.0) + dr.log(one_e)) * flatness
-    return point, dr.select(above > 0.0, e, 1.0) / one_e
+def _sum_wedge(integrand: Callable[..., Any], size: int, state: Any, lanes: Any, rows: _Rows) -> list[Any]:
+    """Rows between both edges."""
+    UInt = type(rows.count)
+
+    def row(j: Any, sigma: Any, vectors: Any, args: Any) -> list[Any]:
+        geometry = Geometry(*vectors)
+        f, e, beyond, lower, upper = _wedge_axes(geometry, *_edges(geometry, sigma))
+        below, above, weight, reach = rows.rows(rows.first + j)
+        count = UInt(reach)
+        w, share = _between(below, above, 0.0, beyond)
+        ends = _tail(-dr.fma(lower[1], w, lower[0])), _tail(dr.fma(upper[1], w, upper[0]))
+        w = sigma * w
+
+        def pair(j: Any, sigma: Any, vectors: Any, args: Any, row: Any) -> list[Any]:
+            (x, y), length2, e, row_weight, ends = row
+            below, above, weight, _ = rows.columns(rows.first_column + j)
+            found = []
+            for tails in ((below, above), (above, below)):
+                v, share = _between(*tails, *ends)
+                v = sigma * v
+                inverse = dr.rsqrt(dr.fma(v, v, length2))
+                slopes = dr.fma(e[0], v, x), dr.fma(e[1], v, y)
+                node_weight = row_weight * weight * share
+                found.append(_facet(integrand, *slopes, inverse, node_weight, vectors, args))
+            return _added(*found)
+
+        inner = sigma, vectors, args, ((w * f[0], w * f[1]), dr.fma(w, w, 1.0), e, weight * share, ends)
+        return summed(pair, count, size, inner, differentiated((sigma, vectors, args)), "wedge columns")
+
+    return summed(row, dr.select(lanes, rows.count, UInt(0)), size, state, label="wedge rows")
 
 
-def _squeeze_between(z: Any, low: Any, high: Any, steepness: Any, flatness: Any) -> tuple[Any, Any]:
-    """Map z ∈ ℝ smoothly onto (low, high); return the point and the derivative over 1 − exp(low − high)."""
-    below, above = steepness * (low - z), steepness * (z - high)
-    e_below, e_above = dr.exp(-dr.abs(below)), dr.exp(-dr.abs(above))
-    one_above = 1.0 + e_above
-    ratio = dr.rcp(one_above)
-    one_below = 1.0 + e_below
-    bend = dr.maximum(below, 0.0) - dr.maximum(above, 0.0) + dr.log(one_below * ratio)
-    inside = dr.select(below > 0.0, e_below, 1.0) * dr.select(above > 0.0, e_above, 1.0)
-    return z + bend * flatness, inside * ratio / one_below
+_MILLS_NUMERATOR = (
+    1.25331413729191,
+    1.22693620522328,
+    0.588547556159811,
+    0.162228791476981,
+    0.0255232844587275,
+    0.00185705961251411,
+)
+_MILLS_DENOMINATOR = (
+    1.0,
+    1.77683801405806,
+    1.3873046605167,
+    0.61389110696835,
+    0.164097870514857,
+    0.0255227910158189,
+    0.00185706893118594,
+)
+
+
+def _tail(x: Any) -> Any:
+    """1 − Φ(x), ends at ±9; relative error 2e-11 for x > 0 (minimax)."""
+    t = dr.minimum(dr.abs(x), _REACH)
+    ratio = polynomial(t, _MILLS_NUMERATOR) / polynomial(t, _MILLS_DENOMINATOR)
+    tail = (1.0 / math.sqrt(2.0 * math.pi)) * dr.exp(-0.5 * t * t) * ratio
+    return dr.select(x < 0.0, 1.0 - tail, tail)
+
+
+_SLOPE_NUMERATOR = (
+    -3.43760451973217,
+    -18.438503171531,
+    -9.69881617592677,
+    13.2296727606752,
+    7.92947712010424,
+    0.777710450327081,
+)
+_SLOPE_DENOMINATOR = (
+    1.0,
+    9.38584347737195,
+    16.533558085708,
+    7.96195665155451,
+    0.777140343555566,
+    6.82996118313344e-06,
+)
+
+
+def _between(below: Any, above: Any, low: Any, high: Any) -> tuple[Any, Any]:
+    """Map a normal variable z onto one between two bounds.
+
+    Parameters
+    ----------
+    below, above
+        Φ(z) and 1 − Φ(z).
+    low, high
+        Probability below the lower bound and above the upper one.
+
+    Returns
+    -------
+    x, share
+        Point between the bounds, absolute error 4e-10 (minimax) within ±9; probability between the bounds.
+    """
+    share = dr.maximum((1.0 - low) - high, 0.0)
+    left, right = dr.fma(share, below, low), dr.fma(share, above, high)
+    # x with the smaller of the two tails p, as a rational function of √(−2 log p)
+    t = dr.sqrt(-2.0 * dr.log(dr.clip(dr.minimum(left, right), 1e-18, 0.5)))
+    x = polynomial(t, _SLOPE_NUMERATOR) / polynomial(t, _SLOPE_DENOMINATOR)
+    return dr.select(left < right, -x, x), share
 
 
 def _transported_average(
@@ -240,11 +523,10 @@ def _transported_average(
     size: int,
     geometry: Geometry,
     sigma: Any,
-    c_i: Any,
-    c_r: Any,
     args: tuple[Any, ...],
 ) -> list[Any]:
     """Average with the few nodes of :mod:`pbrdf.optics.transport`."""
+    c_i, c_r = _edges(geometry, sigma)
     total: list[Any] = [0.0] * size
     cos_phi, sin_phi = -geometry.s_r[1], geometry.s_r[0]
     across = dr.abs(sin_phi)
@@ -284,9 +566,8 @@ def _nearer_edge_axes(geometry: Geometry, c_i: Any, c_r: Any) -> tuple[Any, ...]
     return (f, e), dr.minimum(c_i, c_r), dr.maximum(c_i, c_r), -cos_phi, dr.abs(sin_phi)
 
 
-def _wedge_axes(geometry: Geometry, sigma: Any) -> tuple[Any, ...]:
-    """Outer axis f, inner axis e, outer limit and the inner limits (constant, slope in the outer variable)."""
-    c_i, c_r = _edges(geometry, sigma)
+def _wedge_axes(geometry: Geometry, c_i: Any, c_r: Any) -> tuple[Any, ...]:
+    """Outer axis f, inner axis e, probability beyond the outer limit, inner limits (constant, slope in the outer)."""
     cos_phi, sin_phi = -geometry.s_r[1], geometry.s_r[0]
     cos_d = -cos_phi  # a_i·a_r
     same_side = cos_d >= 0.0
@@ -309,7 +590,7 @@ def _wedge_axes(geometry: Geometry, sigma: Any) -> tuple[Any, ...]:
     f = (choose(f_same[0], f_opposite[0]), choose(f_same[1], f_opposite[1]))
     e = (choose(e_same[0], e_opposite[0]), choose(e_same[1], e_opposite[1]))
     corner = 0.5 * (c_i + c_r) / dr.maximum(C, 1e-12)
-    w_max = dr.minimum(choose(c_near, corner), _FAR)
+    beyond = _tail(choose(c_near, corner))
     lower = (choose(-_FAR, -c_r / S), choose(0.0, C / S))
     upper = (choose(c_far * inverse, c_i / S), choose(-cos_d * inverse, -C / S))
-    return f, e, w_max, lower, upper
+    return f, e, beyond, lower, upper

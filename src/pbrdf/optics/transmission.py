@@ -26,6 +26,7 @@ from pbrdf.optics.reference_planes import tilt_rotation
 __all__ = [
     "NORMALIZATIONS",
     "TRANSMITTANCES",
+    "average_steepness",
     "exit_and_entry_polarisation",
     "exit_polarisation",
     "visible_means",
@@ -33,6 +34,8 @@ __all__ = [
 
 NORMALIZATIONS = ("weighted", "visible")
 TRANSMITTANCES = ("flux", "amplitude")
+#: E[W M_t] by itself, not over E[W], is as exact as that ratio if W counts as this many times steeper.
+_UNWEIGHTED = 6.0
 
 
 def exit_polarisation(
@@ -44,6 +47,7 @@ def exit_polarisation(
     normalization: str = "weighted",
     transmittance: str = "flux",
     accuracy: str = "default",
+    rule: str | None = None,
 ) -> tuple[Any, Any, Any]:
     """First column (I, Q, U) of D_v, paper eqs (12)-(13), in the surface's frame of the reflected ray.
 
@@ -57,6 +61,8 @@ def exit_polarisation(
         Reading of eq. (13) and of M_t, see the module.
     accuracy
         Accuracy of the average over the facets.
+    rule
+        How all lanes average, where that is known, see :func:`pbrdf.optics.quadrature.facet_average`.
     """
 
     unit = _unit_of_weights(geometry, sigma)
@@ -72,7 +78,9 @@ def exit_polarisation(
 
     # W only where it is used: Dr.Jit 1.5 crashes on derivatives of a loop of which an output was dropped
     weighted = normalization == "weighted"
-    found = facet_average(integrand, 4 if weighted else 3, geometry, sigma, (n, kappa, k), accuracy)
+    steepness = average_steepness(dr.detach(k), normalization)
+    size = 4 if weighted else 3
+    found = facet_average(integrand, size, geometry, sigma, (n, kappa, k), accuracy, steepness, rule)
     intensity, q, u = found[:3]
     if weighted:
         scale = _inverse(found[3])
@@ -83,7 +91,13 @@ def exit_polarisation(
 
 
 def exit_and_entry_polarisation(
-    geometry: Geometry, sigma: Any, n: Any, kappa: Any | None, k: Any, accuracy: str = "default"
+    geometry: Geometry,
+    sigma: Any,
+    n: Any,
+    kappa: Any | None,
+    k: Any,
+    accuracy: str = "default",
+    rule: str | None = None,
 ) -> list[list[Any]]:
     """3 x 3 block (I, Q, U) of D_b = E[W T_out D_s T_in]/E[W]: light enters and leaves through the facet.
 
@@ -100,9 +114,15 @@ def exit_and_entry_polarisation(
         row = _transmission_vector(m, mu_i, geometry.p_i, geometry.s_i, n, kappa)
         return (W, *(W * out * enter for out in column for enter in row))
 
-    E_W, *block = facet_average(integrand, 10, geometry, sigma, (n, kappa, k), accuracy)
+    steepness = average_steepness(dr.detach(k))
+    E_W, *block = facet_average(integrand, 10, geometry, sigma, (n, kappa, k), accuracy, steepness, rule)
     scale = _inverse(E_W)
     return [[block[3 * i + j] * scale for j in range(3)] for i in range(3)]
+
+
+def average_steepness(k: Any, normalization: str = "weighted") -> Any:
+    """Steepness of W for :func:`pbrdf.optics.quadrature.facet_average`."""
+    return dr.abs(k - 1.0) * (1.0 if normalization == "weighted" else _UNWEIGHTED)
 
 
 def _unit_of_weights(geometry: Geometry, sigma: Any) -> Any:
