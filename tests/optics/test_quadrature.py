@@ -5,8 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.integrate import dblquad
+from scipy.stats import norm
 
 import independent as ref
+from pbrdf.models import DoubleGauss
+from pbrdf.optics import quadrature
 from pbrdf.optics.diffuse import minnaert_shape
 from pbrdf.optics.geometry import geometry_from_angles
 from pbrdf.optics.quadrature import RULES, choose_rule, facet_average, wedge_distance
@@ -183,3 +186,30 @@ def test_choice_of_rule(jit, accuracy, c_i, c_r, sigma, k, rule):
     assert RULES[choose_rule(c_i, c_r, sigma, steepness, accuracy)] == rule
     arrays = (jit(x) for x in (c_i, c_r, sigma, steepness))
     assert RULES[choose_rule(*arrays, accuracy)[0]] == rule
+
+
+@pytest.mark.slow
+def test_default_accuracy_of_random_paints():
+    """docs/model.md, section 4: 1e-5 of f00 for σ ≤ 0.1 and zenith angles up to 75°, but for few cases."""
+    rng = np.random.default_rng(77)
+    count = 20_000
+    angles = (*np.radians(rng.uniform(0.0, 75.0, (2, count))), rng.uniform(0.0, 2.0 * np.pi, count))
+    sigma, n = rng.uniform(0.002, 0.1, count), rng.uniform(1.3, 2.2, count)
+    k, t = rng.uniform(0.7, 4.0, count), rng.uniform(0.0, 1.0, count)
+    models = (DoubleGauss(sigma, n, 1.0, k, 0.0, t, accuracy=a) for a in ("default", "high"))
+    found, expected = (model.mueller(*angles) for model in models)
+    error = abs(found - expected).max((1, 2)) / expected[:, 0, 0]
+    assert np.quantile(error, 0.999) < 1e-5 and error.max() < 1e-4
+
+
+def test_truncated_normal_variable(jit):
+    """Φ to 2e-11 and the map between two bounds to 1e-9, also where the bounds lie far on one side."""
+    x = np.linspace(-8.0, 8.0, 1001)
+    np.testing.assert_allclose(quadrature._tail(jit(x)).numpy(), norm.sf(x), rtol=3e-11)
+    z = np.linspace(-4.0, 4.0, 101)
+    for low, high in ((-9.0, 9.0), (-9.0, 2.0), (-0.3, 0.1), (1.0, 2.0), (-3.0, -2.9)):
+        tails = jit([norm.cdf(low)]), jit([norm.sf(high)])
+        found, share = quadrature._between(jit(norm.cdf(z)), jit(norm.sf(z)), *tails)
+        expected = norm.ppf(norm.cdf(low) + (norm.cdf(high) - norm.cdf(low)) * norm.cdf(z))
+        np.testing.assert_allclose(found.numpy(), expected, atol=1e-8)
+        assert share.numpy()[0] == pytest.approx(norm.cdf(high) - norm.cdf(low), rel=1e-9)

@@ -155,16 +155,18 @@ class _GaussianFacets(Model):
         names = "theta_i", "theta_r", "sigma"
         low, high = ([float(f(scalars[name])) for name in names] for f in (np.min, np.max))
         k = [float(f(scalars["k"])) for f in (np.min, np.max)]
-        first = rule(*low, min(max(1.0, k[0]), k[1]))
-        last = rule(*high, max(k, key=lambda x: abs(x - 1.0)))
+        first = rule(low[0], low[1], low[2], min(max(1.0, k[0]), k[1]))
+        last = rule(high[0], high[1], high[2], max(k, key=lambda x: abs(x - 1.0)))
         if first == last:
             return [(self._with_rule(first), None)]
         if size < _FEW:
             return [(self, None)]
-        found = rule(*(floats[name] for name in (*names, "k")))
+        found = rule(floats["theta_i"], floats["theta_r"], floats["sigma"], floats["k"])
         dr.eval(found)
-        groups = [(self._with_rule(j), dr.compress(found == j)) for j in range(first, last + 1)]
-        return [(model, lanes) for model, lanes in groups if len(lanes)]
+        groups: list[tuple[Self, Any]] = [
+            (self._with_rule(j), dr.compress(found == j)) for j in range(first, last + 1)
+        ]
+        return [(model, lanes) for model, lanes in groups if dr.width(lanes) > 0]
 
     def _with_rule(self, index: int) -> Self:
         """The same model for directions that all take one rule."""

@@ -199,6 +199,11 @@ def check_angles(angles: dict[str, Any]) -> dict[str, np.ndarray]:
             array = np.asarray(value, dtype=float)
         except (TypeError, ValueError) as error:
             raise ModelError(f"{name} is not a number or an array of numbers: {value!r}") from error
+        # two passes over the numbers where all is well; no comparison holds with a NaN
+        lower, upper = (-_MANY_TURNS, _MANY_TURNS) if name == "phi" else (0.0, _RIGHT_ANGLE)
+        if array.size and lower <= array.min() and array.max() <= upper:
+            checked[name] = array
+            continue
         bad = ~np.isfinite(array)
         if name != "phi":
             bad |= (array < 0.0) | (array > _RIGHT_ANGLE)
