@@ -70,7 +70,9 @@ def horizon_guard(theta_i: Any, theta_r: Any) -> tuple[Any, Any, Any]:
     """Zenith angles with those at and below the horizon moved to 0, and which are above it."""
     import drjit as dr
 
-    visible = (dr.cos(theta_i) > _HORIZON) & (dr.cos(theta_r) > _HORIZON)
+    # cosθ > 1e-12 without a cosine
+    limit = 0.5 * math.pi - _HORIZON
+    visible = (dr.abs(theta_i) < limit) & (dr.abs(theta_r) < limit)
     return dr.select(visible, theta_i, 0.0), dr.select(visible, theta_r, 0.0), visible
 
 
