@@ -570,7 +570,7 @@ def _wedge_axes(geometry: Geometry, c_i: Any, c_r: Any) -> tuple[Any, ...]:
     """Outer axis f, inner axis e, probability beyond the outer limit, inner limits (constant, slope in the outer)."""
     cos_phi, sin_phi = -geometry.s_r[1], geometry.s_r[0]
     cos_d = -cos_phi  # a_i·a_r
-    same_side = cos_d >= 0.0
+    same_side = cos_d >= -1e-9  # at a right angle, whichever way it is rounded
 
     # same side: f across the nearer edge
     (f_same, e_same), c_near, c_far, _, sin_d = _nearer_edge_axes(geometry, c_i, c_r)
