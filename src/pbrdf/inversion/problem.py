@@ -249,7 +249,7 @@ def residuals(
     # grazing geometries take more work: side by side with their like
     order = np.argsort(np.maximum(first.theta_i, first.theta_r), kind="stable")
     if space.blocks is None:
-        rough = None if single else partial(residuals, space, data, starts, accuracy, single=True)
+        rough: Any = None if single else partial(residuals, space, data, starts, accuracy, single=True)
         return Residuals(function, points, _penalty(space), space.loss, order, rough)
     place = space.blocks.places(getattr(first, space.blocks.split))
     blocks = len(space.blocks.labels)

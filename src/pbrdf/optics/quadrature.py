@@ -114,7 +114,8 @@ def _clear_rules() -> tuple[list[tuple[float, ...]], list[tuple[int, int]]]:
     twelve += [(sign * x, x, w) for x, w in ((s, w_s), (t, w_t)) for sign in (1.0, -1.0)]
     rows = zip(_hermite(5), (4, 6, 6, 6, 4), strict=True)
     product = [(u, v, w * w_v) for (u, w), count in rows for v, w_v in _pairs(count)]
-    ranges, pairs = [], []
+    ranges: list[tuple[int, int]] = []
+    pairs: list[tuple[float, ...]] = []
     for rule in (seven, twelve, product):
         ranges.append((len(pairs), len(rule)))
         pairs.extend((*pair, 0.0) for pair in rule)
