@@ -92,7 +92,7 @@ _ACCURACY = Option(
 )
 
 #: Fewer directions than this are not worth a kernel for each rule of the average over the facets.
-_FEW = 2048
+_FEW = 1 << 16
 #: Up to this slope standard deviation a renderer averages over the facets with accuracy ``fast``.
 FAST_SIGMA = 0.06
 #: Bounds of a fit for normalization="visible", whose average diverges for k ≤ 1/3.

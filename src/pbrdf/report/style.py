@@ -59,6 +59,7 @@ _RC: dict[str, Any] = {
     "lines.linewidth": 1.4,
     "lines.markersize": 4.5,
     "svg.hashsalt": "pbrdf",
+    "axes.titley": 1.0,  # no search for the ticks that a title might meet
     "pdf.fonttype": 42,
 }
 #: Resolution of figures.
