@@ -247,7 +247,7 @@ def residuals(
         return weighted, alive
 
     # grazing geometries take more work: side by side with their like
-    order = np.argsort(np.maximum(first.theta_i, first.theta_r), kind="stable")
+    order = np.argsort(np.maximum(first.theta_i, first.theta_r), kind="stable").astype(np.uint32)
     if space.blocks is None:
         rough: Any = None if single else partial(residuals, space, data, starts, accuracy, single=True)
         return Residuals(function, points, _penalty(space), space.loss, order, rough)

@@ -628,7 +628,7 @@ def _wide_normal_equations(
     share = max(1, min(WIDTH // batch, points))
     slice_ = max(SLICE // batch, share)
     places = dr.opaque(UInt32, share)
-    order = UInt32(np.arange(points) if residuals.order is None else residuals.order)
+    order = dr.arange(UInt32, points) if residuals.order is None else UInt32(residuals.order)
     number = dr.arange(UInt32, batch * share)
     owner = number // places
     offset = number - owner * places
