@@ -268,7 +268,24 @@ def test_a_kink_is_a_minimum_though_its_gradient_does_not_vanish():
     def function(u, lane, point):
         return [dr.abs(u[0]) + 1.0], None
 
-    solution = solve(Residuals(function, 1), np.array([[0.7], [-0.4]]), np.array([-2.0]), np.array([2.0]))
+    low, high = np.array([-2.0]), np.array([2.0])
+    solution = solve(Residuals(function, 1), np.array([[0.7], [-0.4]]), low, high)
     assert (solution.iterations < 70).all()
     assert np.abs(solution.u).max() < 1e-6
-    assert solution.best() in (0, 1)
+    assert solution.best(low, high) in (0, 1)
+
+
+def test_of_equal_ends_the_best_is_one_inside_the_bounds():
+    """r = u + v − 3 on 0 … 2: all of the valley is as good; its ends at a bound would look as if v were determined."""
+
+    def function(u, lane, point):
+        return [u[0] + u[1] - 3.0, 1.0 + 0.0 * u[0]], None
+
+    low, high = np.zeros(2), np.full(2, 2.0)
+    start = np.array([[2.0, 1.5], [2.0, 0.2], [1.4, 1.5], [0.1, 2.0]])
+    solution = solve(Residuals(function, 1), start, low, high)
+    assert solution.converged.all()
+    np.testing.assert_allclose(solution.cost, 0.5, rtol=1e-9)
+    inside = ((solution.u > 1e-6) & (solution.u < 2.0 - 1e-6)).all(axis=1)
+    assert inside.any() and not inside.all()
+    assert inside[solution.best(low, high)]

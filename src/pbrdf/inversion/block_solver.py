@@ -161,7 +161,7 @@ def recombined(
     lanes = np.flatnonzero(np.isfinite(found.cost))
     if not len(lanes):
         return found
-    best = found.best()
+    best = found.best(lower, upper)
     result = Solution(**{f.name: getattr(found, f.name).copy() for f in fields(Solution)})
     evaluate = _Evaluation(problem)
     for _ in range(RECOMBINATIONS):

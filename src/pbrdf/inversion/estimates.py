@@ -10,7 +10,7 @@ import numpy as np
 from pbrdf.inversion.clusters import cluster
 from pbrdf.inversion.observations import Observations
 from pbrdf.inversion.problem import Space
-from pbrdf.inversion.solver import Solution
+from pbrdf.inversion.solver import BOUND_MARGIN, Solution
 from pbrdf.inversion.statistics import Goodness, covariance, prior_spread
 from pbrdf.models.parameters import Parameter
 
@@ -84,8 +84,8 @@ def estimates_at(
     """
     low, high = space.box
     u = solution.u[best]
-    at_low = u <= low + 1e-9 * (high - low)
-    at_high = u >= high - 1e-9 * (high - low)
+    margin = BOUND_MARGIN * (high - low)
+    at_low, at_high = u <= low + margin, u >= high - margin
     inside = np.flatnonzero(~(at_low | at_high))
     prior = prior_spread(low, high)
     information = solution.information[best][np.ix_(inside, inside)]

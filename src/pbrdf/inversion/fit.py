@@ -218,7 +218,7 @@ def _summarise(
 ) -> FitResult:
     import xarray as xr
 
-    best = solution.best()
+    best = solution.best(*space.box)
     values = space.to_parameters(solution.u[best])
     values = np.clip(values, space.lower, space.upper)
     model = space.build(values)

@@ -39,6 +39,8 @@ ROUNDS, SMALL_BATCH, LAUNCH = 10, 1024, 1 << 18
 #: (about half a second of one core), shared by about WIDTH lanes.
 SLICE, WIDTH = 1 << 15, 2048
 
+#: An unknown stands on a bound that is no farther than this part of its range.
+BOUND_MARGIN = 1e-9
 #: How often a step is solved again with the unknowns that would cross a bound held on it.
 BOUND_PASSES = 2
 #: From so many evaluations in an iteration on, a batch is searched in single precision first, which takes a third of
@@ -178,11 +180,17 @@ class Solution:
         """Mask of the lanes that stand at a minimum, shape (B,)."""
         return np.isin(self.status, [s for s in Status if s.converged])
 
-    def best(self) -> int:
-        """Number of the lane of the lowest cost: among those as low but for rounding, one at a minimum."""
+    def best(self, lower: np.ndarray, upper: np.ndarray) -> int:
+        """Number of the lane of the lowest cost: among those as low but for rounding, one at a minimum.
+
+        Of these again one that stands on the fewest of the bounds, shape (P,) each: the end of a valley of equal cost
+        that a bound cuts off is no better than any other place in it, but looks determined.
+        """
         cost = np.where(np.isfinite(self.cost), self.cost, np.inf)
         as_low = np.flatnonzero(cost <= cost.min() * (1.0 + NOTHING_TO_GAIN))
-        return int(min(as_low, key=lambda lane: (not self.converged[lane], cost[lane])))
+        margin = BOUND_MARGIN * (upper - lower)
+        held = ((self.u <= lower + margin) | (self.u >= upper - margin)).sum(axis=1)
+        return int(min(as_low, key=lambda lane: (not self.converged[lane], held[lane], cost[lane])))
 
 
 def solve(
