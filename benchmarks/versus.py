@@ -122,7 +122,14 @@ class Worker:
             self.log = (self.scratch / "log.txt").open("ab")
             cache = self.scratch / "cache"
             cache.mkdir(exist_ok=True)
-            environment = {**os.environ, "PYTHONPATH": str(self.tree / "src"), "DRJIT_CACHE_DIR": str(cache)}
+            environment = {
+                **os.environ,
+                "PYTHONPATH": str(self.tree / "src"),
+                "DRJIT_CACHE_DIR": str(cache),
+                # what is installed has its bytecode, and so have the commands here
+                "PYTHONPYCACHEPREFIX": str(self.scratch / "bytecode"),
+                "PYTHONDONTWRITEBYTECODE": "",
+            }
             self.process = subprocess.Popen(
                 [
                     sys.executable,
