@@ -119,7 +119,7 @@ def test_short_work_shows_no_progress(capsys):
 def test_ctrl_c_ends_a_dense_fit_within_two_seconds(tmp_path, wait):
     dense(tmp_path / "dense.csv", 20_000)
     running = subprocess.Popen(
-        [*COMMAND, "fit", "dense.csv", "--starts", "512", "-o", "out"],
+        [*COMMAND, "fit", "dense.csv", "--starts", "8192", "-o", "out"],
         cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
     time.sleep(wait)
