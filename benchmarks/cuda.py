@@ -26,7 +26,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from evaluation import PAINT, processor, random_geometries
+from evaluation import PAINT, random_geometries
+from machine import processor
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table

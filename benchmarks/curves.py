@@ -25,7 +25,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from evaluation import PAINT, processor, random_geometries
+from evaluation import PAINT, random_geometries
+from machine import processor
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter

@@ -43,6 +43,7 @@ from shutil import which
 from typing import Any
 
 import numpy as np
+from machine import processor
 from peers import double_gauss_numpy as numpy_peer
 from peers.other_models import mitsuba_peers, scatmech_peer
 from rich.box import SIMPLE_HEAD
@@ -292,15 +293,6 @@ def show_others(console: Console, others: dict[str, Any]) -> None:
     console.print(table)
     if others["scatmech_difference"] is not None:
         console.print(f"SCATMECH against pbrdf's specular part: {others['scatmech_difference']:.1e} of f00\n")
-
-
-def processor() -> str:
-    """Name of the processor, as far as the system tells."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text().splitlines()
-    except OSError:
-        return platform.processor() or platform.machine()
-    return next((line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")), "unknown")
 
 
 def show(console: Console, results: list[dict[str, Any]]) -> None:

@@ -39,6 +39,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from machine import processor
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
@@ -371,15 +372,6 @@ def judge(reports: list[dict[str, Any]]) -> None:
             ratio = other["seconds"]["base"] / report["seconds"]["this"]
             report["ratio_to_full_command"] = ratio
         report["met"] = ratio >= report["target"]
-
-
-def processor() -> str:
-    """Name of the processor, as far as the system tells."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text().splitlines()
-    except OSError:
-        return platform.processor() or platform.machine()
-    return next((line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")), "unknown")
 
 
 def main() -> int:

@@ -25,6 +25,7 @@ from pbrdf.inversion.blocks import Blocks
 from pbrdf.inversion.solver import (
     BOUND_PASSES,
     CREEPING,
+    DAMPING,
     LAUNCH,
     NOTHING_TO_GAIN,
     PATIENCE,
@@ -211,7 +212,7 @@ class _Walk:
         status = np.where(free, Status.RUNNING, Status.ZERO_GRADIENT)
         status = np.where(np.isfinite(cost), status, Status.NOT_FINITE)
         none = np.zeros(len(cost), dtype=np.int64)
-        return cls(cost, status, none + 1, np.full(len(cost), 1e-3), np.full(len(cost), 2.0), none)
+        return cls(cost, status, none + 1, np.full(len(cost), DAMPING), np.full(len(cost), 2.0), none)
 
     def __getitem__(self, chosen: np.ndarray) -> _Walk:
         return _Walk(**{f.name: getattr(self, f.name)[chosen] for f in fields(self)})

@@ -298,19 +298,20 @@ def facet_average(
     def lanes(name: str) -> Any:
         return index == RULES.index(name) if rule is None else name == rule
 
-    # the rule enters as opaque data, so that the accuracies share one kernel
-    rows = _Rows(
-        *(dr.opaque(UInt, x) for x in _TABLES.ranges_of[accuracy]),
-        *(_packets(F, numbers) for numbers in _TABLES[1:]),
-    )
     state = sigma, tuple(geometry), args
     sums = []
     if rule in (None, "twelve", "many"):
         sums.append(_sum_clear(integrand, size, state, [lanes(name) for name in RULES[:3]]))
-    if rule in (None, "one_edge"):
-        sums.append(_sum_edge(integrand, size, state, lanes("one_edge"), rows))
-    if rule in (None, "both_edges"):
-        sums.append(_sum_wedge(integrand, size, state, lanes("both_edges"), rows))
+    if rule in (None, "one_edge", "both_edges"):
+        # the rule enters as opaque data, so that the accuracies share one kernel
+        rows = _Rows(
+            *(dr.opaque(UInt, x) for x in _TABLES.ranges_of[accuracy]),
+            *(_packets(F, numbers) for numbers in _TABLES[1:]),
+        )
+        if rule in (None, "one_edge"):
+            sums.append(_sum_edge(integrand, size, state, lanes("one_edge"), rows))
+        if rule in (None, "both_edges"):
+            sums.append(_sum_wedge(integrand, size, state, lanes("both_edges"), rows))
     return _added(*sums)
 
 
