@@ -4,8 +4,9 @@
 
 ``evaluation``: full Mueller matrices, in double precision with NumPy arrays in and out (``mueller()``), and as a
 renderer has them: directions and matrices stay in the device's memory, double and single precision. ``fit``: the batch
-of ``fit.py``, in double precision throughout, and as the solver does it by itself, where it searches in single
-precision first. ``render``: the scene of ``rendering.py``; Mitsuba's variants compute in single precision.
+of ``fit.py``, measured values in the device's memory, parameters and their information matrices back in the host's; in
+double precision throughout, and as the solver does it by itself, where it searches in single precision first.
+``render``: the scene of ``rendering.py``; Mitsuba's variants compute in single precision.
 
 The two take turns; printed are medians and their ratio. They must agree: matrices to 1e-9 of f00 in double and 1e-4 in
 single precision, fitted parameters to 1e-5 of their size, pictures to 1 % of their mean (other random numbers). The
@@ -15,6 +16,7 @@ status is 1 otherwise. ``--device llvm`` is the rehearsal of ``cuda.sh``.
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import importlib.util
 import json
 import os
@@ -39,8 +41,8 @@ from pbrdf.optics.geometry import geometry_from_angles
 #: Aims on one H100, directions and fits a second; of what the host's memory and its bus do not hold up.
 DIRECTIONS_AIM, FITS_AIM = 500e6, 1e6
 #: Work of a turn on a card and on a processor: a card wants many lanes.
-DIRECTIONS = {"cuda": 1 << 22, "llvm": 1 << 19}
-FITS = {"cuda": 32768, "llvm": 2048}
+DIRECTIONS = {"cuda": 1 << 24, "llvm": 1 << 20}
+FITS = {"cuda": 1 << 18, "llvm": 1 << 13}
 ROUNDS = 5
 
 
@@ -150,24 +152,36 @@ def evaluation(device: str) -> list[dict[str, Any]]:
 
 
 def fit(device: str) -> list[dict[str, Any]]:
-    """Batches of fits of 6 parameters to 42 geometries of (I, Q, U)."""
+    """Batches of fits of 6 parameters to 42 geometries of (I, Q, U), the data in the device's memory."""
     import fit as script
 
-    from pbrdf.inversion import solver
+    from pbrdf.inversion.problem import residuals
+    from pbrdf.inversion.solver import WORTH_SINGLE, solve
 
-    rows = []
-    # the solver searches large batches in single precision, if this build's does so
-    threshold = getattr(solver, "WORTH_SINGLE", None)
-    precisions = {"double": sys.maxsize} | ({} if threshold is None else {"single, then double": threshold})
+    problem = script.space()
+    low, high = problem.box
     data = script.measurements(max(FITS[backend] for backend in places(device).values()))
-    for name, worth in precisions.items():
+    rows = []
+    for name in ("double", "single, then double"):
         row = Row(f"batch fit, {name}", "fits", 1e-5, FITS_AIM)
-        if threshold is not None:
-            solver.WORTH_SINGLE = worth
         for place, backend in places(device).items():
-            call = on(backend, lambda backend=backend: script.fit_batch(data[: FITS[backend]])[1])
-            row.work[place] = (FITS[backend], call)
-            row.compared[place] = call()[: min(FITS.values())]
+            pbrdf.set_backend(backend)
+            count = FITS[backend]
+            prepared = residuals(problem, data[:count])
+            rough = None if name == "double" else prepared.single()
+            assert rough is None or count * prepared.points >= WORTH_SINGLE
+            prepared = dataclasses.replace(
+                prepared, single=None if rough is None else lambda rough=rough: rough
+            )
+            start = np.tile(problem.to_unknowns(script.GUESS), (count, 1))
+
+            def call(prepared: Any = prepared, start: np.ndarray = start) -> np.ndarray:
+                solution = solve(prepared, start, low, high)
+                assert solution.converged.all(), f"{(~solution.converged).sum()} fits did not converge"
+                return problem.to_parameters(solution.u)
+
+            row.work[place] = (count, on(backend, call))
+            row.compared[place] = row.work[place][1]()[: min(FITS.values())]
         row.scale = np.abs(row.compared["processor"]) + 0.1
         rows.append(row.measure())
     return rows

@@ -48,8 +48,14 @@ trap 'exit 130' INT TERM
 RESULTS=${OUT:-$WORK}
 STARTED=$(date +%s)
 
-"$PYTHON" -m venv --system-site-packages "$WORK/venv" || exit 1
+"$PYTHON" -m venv "$WORK/venv" || exit 1
 RUN="$WORK/venv/bin/python"
+# what the machine's Python has, if that is a virtual environment itself, too
+"$PYTHON" - "$("$RUN" -c 'import sysconfig; print(sysconfig.get_path("purelib"))')/machine.pth" <<'END'
+import pathlib, site, sys, sysconfig
+places = {sysconfig.get_path("purelib"), sysconfig.get_path("platlib"), *site.getsitepackages()}
+pathlib.Path(sys.argv[1]).write_text("\n".join(sorted(places)) + "\n")
+END
 # one after the other: what cannot be had is told, and the rest goes on
 requirements | while IFS= read -r requirement; do
   "$RUN" -m pip install -q --disable-pip-version-check --no-index --find-links "$WHEELS" --no-compile "$requirement" \

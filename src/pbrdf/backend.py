@@ -14,6 +14,10 @@ LLVM 15 and 16 abort the process on ``dr.minimum`` and LLVM 14 is refused by Dr.
 older than 17 is refused here with a message instead. The environment variable ``PBRDF_BACKEND``
 (``auto``, ``llvm`` or ``cuda``) or :func:`set_backend` choose the backend; ``auto`` takes CUDA if a device
 is there, else LLVM.
+
+With its flag ``FastMath``, which is set from the start, Dr.Jit 1.5 computes reciprocals and reciprocal roots of float64
+on CUDA to a relative 1e-6, also where a derivative needs one. :func:`get_backend` takes the flag off in the threads in
+which pbrdf computes on CUDA, and :func:`exact_reciprocals` does so for a while where it is a user's arrays.
 """
 
 from __future__ import annotations
@@ -21,6 +25,8 @@ from __future__ import annotations
 import importlib.metadata
 import os
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
@@ -32,6 +38,7 @@ __all__ = [
     "BACKENDS",
     "Backend",
     "check_llvm",
+    "exact_reciprocals",
     "find_bundled_llvm",
     "get_backend",
     "llvm_version",
@@ -142,6 +149,8 @@ def set_backend(name: str) -> None:
 def get_backend() -> Backend:
     """Return the active backend, starting Dr.Jit the first time.
 
+    Where it is CUDA, the calling thread's flag ``FastMath`` of Dr.Jit is taken off.
+
     Raises
     ------
     BackendError
@@ -156,7 +165,23 @@ def get_backend() -> Backend:
                 f"{', '.join(BACKENDS)}, or unset it"
             )
         _active = _start(name)
+    if _active.name == "cuda":
+        import drjit as dr
+
+        dr.set_flag(dr.JitFlag.FastMath, False)
     return _active
+
+
+@contextmanager
+def exact_reciprocals(Float: Any) -> Iterator[None]:
+    """Record formulas over `Float` such that reciprocals are as exact as the type, on CUDA too."""
+    import drjit as dr
+
+    if dr.backend_v(Float) == dr.JitBackend.CUDA and dr.type_v(Float) == dr.VarType.Float64:
+        with dr.scoped_set_flag(dr.JitFlag.FastMath, False):
+            yield
+    else:
+        yield
 
 
 def point_drjit_to_llvm() -> None:

@@ -115,6 +115,10 @@ class Status(enum.IntEnum):
         return self in (Status.SMALL_STEP, Status.SMALL_REDUCTION, Status.ZERO_GRADIENT)
 
 
+#: Why a lane stopped that stands at a minimum.
+_CONVERGED = [status for status in Status if status.converged]
+
+
 @dataclass(frozen=True)
 class Residuals:
     """What the solver minimises: ½ Σ ρ(r²) over the points of a lane, plus ½ Σ of squared penalties.
@@ -178,7 +182,7 @@ class Solution:
     @property
     def converged(self) -> np.ndarray:
         """Mask of the lanes that stand at a minimum, shape (B,)."""
-        return np.isin(self.status, [s for s in Status if s.converged])
+        return np.isin(self.status, _CONVERGED)
 
     def best(self, lower: np.ndarray, upper: np.ndarray) -> int:
         """Number of the lane of the lowest cost: among those as low but for rounding, one at a minimum.
@@ -245,11 +249,13 @@ def solve(
             single=True,
         )
         # rounding makes lanes stall in single precision that stand at their minimum
-        near = rough.converged | (rough.status == Status.STALLED)
-        start = np.where(np.isfinite(rough.cost)[:, None], np.clip(rough.u, lower, upper), start)
+        near = np.isin(rough.status, [*_CONVERGED, Status.STALLED])
+        start = np.where(np.isfinite(rough.cost)[:, None], np.clip(rough.u.T, lower, upper), start)
         damping, last = np.where(near, DAMPING_NEAR, DAMPING), np.where(near, LAST_STEP_NEAR, LAST_STEP)
         tried, progress = rough.iterations, None
-    solution = _solve(residuals, start, lower, upper, damping, last, max_iterations, tolerance, progress)
+    solution = _solve(
+        residuals, start, lower, upper, damping, last, max_iterations, tolerance, progress
+    ).solution()
     solution.iterations[:] += tried
     solution.status[nothing_to_gain(solution, lower, upper)] = Status.SMALL_REDUCTION
     return solution
@@ -267,18 +273,18 @@ def _solve(
     progress: Callable[[int, int], None] | None,
     *,
     single: bool = False,
-) -> Solution:
+) -> _Result:
     """:func:`solve` in one precision, from starts within the bounds; a first damping and last step of each."""
     import drjit as dr
 
     backend = get_backend()
     Float, UInt32 = backend.Float32 if single else backend.Float, backend.UInt32
     batch, size = start.shape
-    result = _Result(batch, size)
+    result = _Result(batch, size, sums=not single)
     # a batch of one would be compiled apart, as a broadcast: double it
     lanes = np.arange(batch, dtype=np.uint32) if batch > 1 else np.zeros(2, dtype=np.uint32)
-    begin = (start, lower, upper, damping, last)
-    state = _State.initial(backend, Float, *(values[lanes] for values in begin))
+    doubled = [values if batch > 1 else values[lanes] for values in (start, lower, upper, damping, last)]
+    state = _State.initial(backend, Float, *doubled)
     limit = dr.opaque(UInt32, max_iterations)
     small = dr.opaque(Float, tolerance)
     few = batch // FEW if single else 0
@@ -300,7 +306,7 @@ def _solve(
             progress(max(batch - len(lanes), 0), batch)
     if len(lanes):
         result.store(lanes, np.arange(len(lanes)), state, state.status.numpy())
-    return result.solution()
+    return result
 
 
 def linearise(function: Function, u: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:
@@ -423,31 +429,39 @@ _FIXED = ("low", "high", "last")
 
 
 class _Result:
-    """Collects lanes as they stop."""
+    """Collects lanes as they stop, an unknown or a sum a row, as Dr.Jit has them; of a search no sums."""
 
-    def __init__(self, batch: int, size: int) -> None:
-        self.u = np.empty((batch, size))
+    def __init__(self, batch: int, size: int, *, sums: bool) -> None:
+        self._sums = sums
+        self.u = np.empty((size, batch))
         self.cost = np.empty(batch)
-        self.A = np.empty((batch, size * (size + 1) // 2))
-        self.g = np.empty((batch, size))
+        self.A = np.empty((size * (size + 1) // 2, batch))
+        self.g = np.empty((size, batch))
         self.status = np.empty(batch, dtype=np.int64)
         self.iterations = np.empty(batch, dtype=np.int64)
 
     def store(self, lanes: np.ndarray, done: np.ndarray, state: _State, status: np.ndarray) -> None:
         target = lanes[done]
-        for columns, values in ((self.u, state.u), (self.A, state.A), (self.g, state.g)):
-            for i, value in enumerate(values):
-                columns[target, i] = value.numpy()[done]
-        self.cost[target] = state.cost.numpy()[done]
-        self.status[target] = status[done]
-        self.iterations[target] = state.iterations.numpy()[done]
+        rows = [(self.cost, state.cost), (self.status, state.status), (self.iterations, state.iterations)]
+        rows += zip(self.u, state.u, strict=True)
+        if self._sums:
+            rows += [*zip(self.A, state.A, strict=True), *zip(self.g, state.g, strict=True)]
+        # whole arrays are copied in a fraction of the time
+        batch = len(self.cost)
+        everything = len(target) == batch == len(status) and np.array_equal(target, np.arange(batch))
+        for row, value in rows:
+            if everything:
+                row[:] = value.numpy()
+            else:
+                row[target] = value.numpy()[done]
 
     def solution(self) -> Solution:
-        batch, size = self.u.shape
-        information = np.empty((batch, size, size))
+        size = len(self.u)
+        place = np.empty((size, size), dtype=int)
         for c, (i, j) in enumerate(zip(*np.tril_indices(size), strict=True)):
-            information[:, i, j] = information[:, j, i] = self.A[:, c]
-        return Solution(self.u, self.cost, information, self.g, self.status, self.iterations)
+            place[i, j] = place[j, i] = c
+        information = self.A[place].transpose(2, 0, 1)
+        return Solution(self.u.T, self.cost, information, self.g.T, self.status, self.iterations)
 
 
 def _iterations(

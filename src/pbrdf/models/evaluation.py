@@ -13,7 +13,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from pbrdf.backend import Backend, get_backend
+from pbrdf.backend import Backend, exact_reciprocals, get_backend
 from pbrdf.errors import ModelError
 from pbrdf.models.arrays import Matrix, is_drjit, is_zero, to_numpy, weighted_sum
 from pbrdf.models.parameters import Parameter
@@ -378,7 +378,8 @@ def _evaluate_drjit(
     theta_i, theta_r, phi = (flatten(angles[name]) for name in ("theta_i", "theta_r", "phi"))
     turns = 2.0 * math.pi * dr.round(phi * (0.5 / math.pi))
     phi = dr.select(dr.abs(phi) > _MANY_TURNS, dr.clip(phi - turns, -math.pi, math.pi), phi)
-    f = kernel_from_angles(model, theta_i, theta_r, phi, values, part)
+    with exact_reciprocals(Float):
+        f = kernel_from_angles(model, theta_i, theta_r, phi, values, part)
     # an opaque mask keeps each output a variable of its own: with constant angles it could be an inner node of
     # the graph, whose derivative Dr.Jit discards
     always = dr.opaque(dr.mask_t(Float), True)
