@@ -31,8 +31,8 @@ IDS = ["-".join(map(str, h)) for h in HARD]
 def average(jit):
     """(θ_i, θ_r, φ, σ, k, accuracy) → ∫P, ∫P W, ∫P W m_x, ∫P W m_x m_y over lit and seen facets, (4, N)."""
 
-    def integrand(m, mu_i, mu_r, geometry, args):
-        W = minnaert_shape(mu_i, mu_r, args[0])
+    def integrand(facet, geometry, args):
+        m, W = facet.normal, minnaert_shape(facet.mu_i, facet.mu_r, args[0])
         return 1.0, W, W * m[0], W * m[0] * m[1]
 
     def function(theta_i, theta_r, phi, sigma, k, accuracy="default"):
@@ -121,8 +121,8 @@ def test_lit_and_seen_probability(average, accuracy, phi_max, tolerance):
 def test_moments_of_a_clear_wedge(average, jit):
     """Both rays near the normal: every facet is lit and seen; slopes have mean 0 and variance σ²."""
 
-    def integrand(m, mu_i, mu_r, geometry, args):
-        x, y = m[0] / m[2], m[1] / m[2]
+    def integrand(facet, geometry, args):
+        x, y = (m / facet.normal[2] for m in facet.normal[:2])
         return 1.0, x, y, x * x, y * y, x * y, x * x * x * x
 
     for sigma in (0.04, 0.1):

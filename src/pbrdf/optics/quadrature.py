@@ -31,17 +31,38 @@ from typing import Any, NamedTuple
 import drjit as dr
 import numpy as np
 
-from pbrdf.optics.geometry import Geometry
+from pbrdf.optics.geometry import Geometry, Vector
 from pbrdf.optics.powers import polynomial
+from pbrdf.optics.reference_planes import tilt_rotation
 from pbrdf.optics.summation import differentiated, summed
 from pbrdf.optics.transport import transported_rows
 
-__all__ = ["ACCURACIES", "CARE", "RULES", "choose_rule", "facet_average", "table", "wedge_distance"]
+__all__ = ["ACCURACIES", "CARE", "RULES", "Facet", "choose_rule", "facet_average", "table", "wedge_distance"]
 
 #: Edges beyond this many standard deviations count as this far.
 _FAR = 50.0
 #: Bounds beyond this many standard deviations are out of reach of every node.
 _REACH = 9.0
+
+
+class Facet(NamedTuple):
+    """What an integrand gets to know of a facet.
+
+    Attributes
+    ----------
+    normal
+        Unit normal m.
+    mu_i, mu_r
+        Local cosines m·ω_i > 0 and m·ω_r > 0.
+    turn_i, turn_r
+        sin²β cos2χ and sin²β sin2χ for either ray, see :func:`pbrdf.optics.reference_planes.tilt_rotation`.
+    """
+
+    normal: Vector
+    mu_i: Any
+    mu_r: Any
+    turn_i: tuple[Any, Any]
+    turn_r: tuple[Any, Any]
 
 
 class _Accuracy(NamedTuple):
@@ -263,8 +284,7 @@ def facet_average(
     Parameters
     ----------
     integrand
-        ``integrand(m, mu_i, mu_r, geometry, args)`` returns a tuple of ``size`` floats: the values for the
-        facet normal m = (m_x, m_y, m_z), with the local cosines μ_i' = m·ω_i > 0 and μ_r' = m·ω_r > 0.
+        ``integrand(facet, geometry, args)`` returns a tuple of ``size`` floats, the values for a :class:`Facet`.
     size
         Number of functions integrated.
     geometry, sigma
@@ -322,26 +342,37 @@ def _pair(
     geometry = Geometry(*vectors)
     cos_phi, sin_phi = -geometry.s_r[1], geometry.s_r[0]
     mu_r = inverse * dr.fma(-u, geometry.sin_r, geometry.cos_r)
+    q, twist = tilt_rotation(inverse * dr.fma(u, geometry.cos_r, geometry.sin_r), inverse * v)
+    x, y = -u * cos_phi, -u * sin_phi
     sides = []
-    for side in (v, -v):
-        x, y = dr.fma(-u, cos_phi, side * sin_phi), dr.fma(-u, sin_phi, -side * cos_phi)
-        mu_i = inverse * dr.fma(-x, geometry.sin_i, geometry.cos_i)
-        sides.append(integrand((x * inverse, y * inverse, inverse), mu_i, mu_r, geometry, args))
+    for turn, side in ((twist, v), (-twist, -v)):
+        slopes = dr.fma(side, sin_phi, x), dr.fma(-side, cos_phi, y)
+        sides.append(integrand(_facet(*slopes, inverse, geometry, mu_r, (q, turn)), geometry, args))
     return [weight * (a + b) for a, b in zip(*sides, strict=True)]
 
 
-def _facet(
+def _facet(x: Any, y: Any, inverse: Any, geometry: Geometry, mu_r: Any, turn_r: Any) -> Facet:
+    """A facet of slopes x and y, 1/√(1 + x² + y²) given, and what is known of it as seen by the viewer."""
+    mu_i = inverse * dr.fma(-x, geometry.sin_i, geometry.cos_i)
+    turn_i = tilt_rotation(inverse * dr.fma(x, geometry.cos_i, geometry.sin_i), -inverse * y)
+    return Facet((x * inverse, y * inverse, inverse), mu_i, mu_r, turn_i, turn_r)
+
+
+def _within(
     integrand: Callable[..., Any], x: Any, y: Any, inverse: Any, weight: Any, vectors: Any, args: Any
 ) -> list[Any]:
     """A facet of slopes x and y within the wedge, 1/√(1 + x² + y²) given."""
     geometry = Geometry(*vectors)
-    mu_i = inverse * dr.fma(-x, geometry.sin_i, geometry.cos_i)
-    mu_r = inverse * dr.fma(x, geometry.omega_r[0], dr.fma(y, geometry.omega_r[1], geometry.omega_r[2]))
-    valid = (mu_i > 0.0) & (mu_r > 0.0)  # but for rounding
-    mu_i, mu_r = dr.select(valid, mu_i, 1.0), dr.select(valid, mu_r, 1.0)
+    cos_phi, sin_phi = -geometry.s_r[1], geometry.s_r[0]
+    # slopes towards the viewer and across
+    u, v = -dr.fma(x, cos_phi, y * sin_phi), dr.fma(x, sin_phi, -y * cos_phi)
+    mu_r = inverse * dr.fma(-u, geometry.sin_r, geometry.cos_r)
+    turn_r = tilt_rotation(inverse * dr.fma(u, geometry.cos_r, geometry.sin_r), inverse * v)
+    facet = _facet(x, y, inverse, geometry, mu_r, turn_r)
+    valid = (facet.mu_i > 0.0) & (mu_r > 0.0)  # but for rounding
+    facet = facet._replace(mu_i=dr.select(valid, facet.mu_i, 1.0), mu_r=dr.select(valid, mu_r, 1.0))
     weight = dr.select(valid, weight, 0.0)
-    values = integrand((x * inverse, y * inverse, inverse), mu_i, mu_r, geometry, args)
-    return [weight * value for value in values]
+    return [weight * value for value in integrand(facet, geometry, args)]
 
 
 def _added(*values: list[Any]) -> list[Any]:
@@ -351,7 +382,8 @@ def _added(*values: list[Any]) -> list[Any]:
 def _seven(integrand: Callable[..., Any], geometry: Geometry, sigma: Any, args: Any) -> list[Any]:
     """Seven points of the whole plane in all lanes, without a loop: six of them have the same length."""
     inverse = dr.rsqrt(dr.fma(4.0 * sigma, sigma, 1.0))
-    flat = integrand((0.0, 0.0, 1.0), geometry.cos_i, geometry.cos_r, geometry, args)
+    turn = tilt_rotation(geometry.sin_r, 0.0)
+    flat = integrand(_facet(0.0, 0.0, 1.0, geometry, geometry.cos_r, turn), geometry, args)
     pairs = [
         _pair(integrand, sigma * u, sigma * v, inverse, _SEVEN_WEIGHT, tuple(geometry), args)
         for u, v in _SEVEN
@@ -412,7 +444,7 @@ def _sum_edge(integrand: Callable[..., Any], size: int, state: Any, lanes: Any, 
             # e is perpendicular to (x, y)
             inverse = dr.rsqrt(dr.fma(v, v, length2))
             sides = ((dr.fma(e[0], side, x), dr.fma(e[1], side, y)) for side in (v, -v))
-            return _added(*(_facet(integrand, *slopes, inverse, weight, vectors, args) for slopes in sides))
+            return _added(*(_within(integrand, *slopes, inverse, weight, vectors, args) for slopes in sides))
 
         inner = sigma, vectors, args, ((w * f[0], w * f[1]), dr.fma(w, w, 1.0), e, weight * share)
         return summed(pair, count, size, inner, differentiated((sigma, vectors, args)), "edge pairs")
@@ -443,7 +475,7 @@ def _sum_wedge(integrand: Callable[..., Any], size: int, state: Any, lanes: Any,
                 inverse = dr.rsqrt(dr.fma(v, v, length2))
                 slopes = dr.fma(e[0], v, x), dr.fma(e[1], v, y)
                 node_weight = row_weight * weight * share
-                found.append(_facet(integrand, *slopes, inverse, node_weight, vectors, args))
+                found.append(_within(integrand, *slopes, inverse, node_weight, vectors, args))
             return _added(*found)
 
         inner = sigma, vectors, args, ((w * f[0], w * f[1]), dr.fma(w, w, 1.0), e, weight * share, ends)
@@ -531,20 +563,23 @@ def _transported_average(
     c_i, c_r = _edges(geometry, sigma)
     total: list[Any] = [0.0] * size
     cos_phi, sin_phi = -geometry.s_r[1], geometry.s_r[0]
-    across = dr.abs(sin_phi)
-    turned_cosine = dr.select(sin_phi < 0.0, -cos_phi, cos_phi)
+    mirror = dr.select(sin_phi < 0.0, -1.0, 1.0)
+    across, turned_cosine = mirror * sin_phi, mirror * cos_phi
     for row in transported_rows(c_r, c_i, -cos_phi, across):
         u = sigma * row.u
         length2 = dr.fma(u, u, 1.0)
         # one exit angle for the whole row, that of the mean square across
         mu_r = dr.fma(-u, geometry.sin_r, geometry.cos_r) * dr.rsqrt(dr.fma(sigma, sigma, length2))
         mu_r = dr.maximum(mu_r, 1e-6)
+        along = dr.fma(u, geometry.cos_r, geometry.sin_r)
         for v, weight in row.nodes:
             v = sigma * v
             x, y = dr.fma(-u, cos_phi, across * v), dr.fma(-u, sin_phi, -turned_cosine * v)
             inverse = dr.rsqrt(dr.fma(v, v, length2))
-            mu_i = dr.maximum(inverse * dr.fma(-x, geometry.sin_i, geometry.cos_i), 1e-6)
-            values = integrand((x * inverse, y * inverse, inverse), mu_i, mu_r, geometry, args)
+            q, twist = tilt_rotation(inverse * along, inverse * v)
+            facet = _facet(x, y, inverse, geometry, mu_r, (q, mirror * twist))
+            facet = facet._replace(mu_i=dr.maximum(facet.mu_i, 1e-6))
+            values = integrand(facet, geometry, args)
             total = [dr.fma(weight, value, t) for value, t in zip(values, total, strict=True)]
     return total
 

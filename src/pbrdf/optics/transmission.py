@@ -20,8 +20,7 @@ from pbrdf.optics.diffuse import minnaert_shape
 from pbrdf.optics.fresnel import transmittances
 from pbrdf.optics.geometry import Geometry, dot
 from pbrdf.optics.powers import polynomial
-from pbrdf.optics.quadrature import facet_average, table
-from pbrdf.optics.reference_planes import tilt_rotation
+from pbrdf.optics.quadrature import Facet, facet_average, table
 
 __all__ = [
     "NORMALIZATIONS",
@@ -67,13 +66,11 @@ def exit_polarisation(
 
     unit = _unit_of_weights(geometry, sigma)
 
-    def integrand(m: Any, mu_i: Any, mu_r: Any, geometry: Geometry, args: Any) -> tuple[Any, ...]:
+    def integrand(facet: Facet, geometry: Geometry, args: Any) -> tuple[Any, ...]:
         n, kappa, k = args
-        W = minnaert_shape(mu_i, mu_r, k, unit)
-        mean, half = transmittances(mu_r, n, kappa, transmittance)
-        q, u = tilt_rotation(m, geometry.p_r, geometry.s_r)
-        half = W * half
-        values = (W * mean, half * q, half * u)
+        W = minnaert_shape(facet.mu_i, facet.mu_r, k, unit)
+        column = _transmission_vector(facet.mu_r, facet.turn_r, n, kappa, transmittance)
+        values = tuple(W * x for x in column)
         return (*values, W) if weighted else values
 
     # W only where it is used: Dr.Jit 1.5 crashes on derivatives of a loop of which an output was dropped
@@ -107,11 +104,11 @@ def exit_and_entry_polarisation(
 
     unit = _unit_of_weights(geometry, sigma)
 
-    def integrand(m: Any, mu_i: Any, mu_r: Any, geometry: Geometry, args: Any) -> tuple[Any, ...]:
+    def integrand(facet: Facet, geometry: Geometry, args: Any) -> tuple[Any, ...]:
         n, kappa, k = args
-        W = minnaert_shape(mu_i, mu_r, k, unit)
-        column = _transmission_vector(m, mu_r, geometry.p_r, geometry.s_r, n, kappa)
-        row = _transmission_vector(m, mu_i, geometry.p_i, geometry.s_i, n, kappa)
+        W = minnaert_shape(facet.mu_i, facet.mu_r, k, unit)
+        column = _transmission_vector(facet.mu_r, facet.turn_r, n, kappa)
+        row = _transmission_vector(facet.mu_i, facet.turn_i, n, kappa)
         return (W, *(W * out * enter for out in column for enter in row))
 
     steepness = average_steepness(dr.detach(k))
@@ -137,10 +134,12 @@ def _unit_of_weights(geometry: Geometry, sigma: Any) -> Any:
     return dr.rcp(dr.detach((mu_i + mu_r) * mu_i * mu_r))
 
 
-def _transmission_vector(m: Any, mu: Any, p: Any, s: Any, n: Any, kappa: Any | None) -> tuple[Any, Any, Any]:
-    """(T_+, T_− cos2χ, T_− sin2χ) of a facet for the ray with frame (p, s): first column or first row."""
-    mean, half = transmittances(mu, n, kappa, "flux")
-    q, u = tilt_rotation(m, p, s)
+def _transmission_vector(
+    mu: Any, turn: tuple[Any, Any], n: Any, kappa: Any | None, transmittance: str = "flux"
+) -> tuple[Any, Any, Any]:
+    """(T_+, T_− cos2χ, T_− sin2χ) of a facet for a ray: first column or first row."""
+    mean, half = transmittances(mu, n, kappa, transmittance)
+    q, u = turn
     return mean, half * q, half * u
 
 
