@@ -1,8 +1,8 @@
 """Powers with a real exponent, the costliest operation of the diffuse part.
 
-x^y = 2^(y log₂x), by polynomials: Dr.Jit's exp and log together take two to three times as many vector instructions. The
-logarithm of the mantissa m is that of one division, log₂m = 2/ln2 · artanh[(m − 1)/(m + 1)] in double precision, or a
-polynomial in m − 1 in single. Relative errors are 1e-14·|y| + 3e-14 and 1e-6·|y|, besides the rounding of y log₂x.
+x^y = 2^(y log₂x), by polynomials: Dr.Jit's exp and log together take two to three times as many vector instructions.
+The logarithm of the mantissa m is log₂m = 2/ln2 · artanh[(m − 1)/(m + 1)] in double precision, or a polynomial in
+m − 1 in single. Relative errors are 1e-14·|y| + 3e-14 and 1e-6·|y|, besides the rounding of y log₂x.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ _EXP2_DOUBLE = (
 
 
 class _Format(NamedTuple):
-    """A kind of floating-point numbers: bits of the mantissa, least mantissa of the logarithm, range of exponents, 2^g."""
+    """Floating-point numbers: bits of the mantissa, least mantissa of the logarithm, range of exponents, 2^g."""
 
     mantissa: int
     lowest: int
