@@ -148,7 +148,7 @@ class _GaussianFacets(Model):
         normalization = self.chosen.get("normalization", "weighted")
 
         def rule(theta_i: Any, theta_r: Any, sigma: Any, k: Any) -> Any:
-            c_i, c_r = (wedge_distance(dr.cos(theta), dr.sin(theta), sigma) for theta in (theta_i, theta_r))
+            c_i, c_r = (wedge_distance(*dr.sincos(theta)[::-1], sigma) for theta in (theta_i, theta_r))
             return choose_rule(c_i, c_r, sigma, average_steepness(k, normalization), accuracy)
 
         # the rule goes up with each of these

@@ -32,13 +32,14 @@ import drjit as dr
 import numpy as np
 
 from pbrdf.optics.geometry import Geometry, Vector
-from pbrdf.optics.powers import polynomial
+from pbrdf.optics.powers import exp2, log2, polynomial
 from pbrdf.optics.reference_planes import tilt_rotation
 from pbrdf.optics.summation import differentiated, summed
 from pbrdf.optics.transport import transported_rows
 
 __all__ = ["ACCURACIES", "CARE", "RULES", "Facet", "choose_rule", "facet_average", "table", "wedge_distance"]
 
+_LN2 = math.log(2.0)
 #: Edges beyond this many standard deviations count as this far.
 _FAR = 50.0
 #: Bounds beyond this many standard deviations are out of reach of every node.
@@ -96,7 +97,7 @@ class _Accuracy(NamedTuple):
 #: ``draft`` is for searching (errors up to 1 % where the wedge cuts in), ``high`` for reference values, ``fast``
 #: for rendering: a rule of its own, see :mod:`pbrdf.optics.transport`.
 ACCURACIES: dict[str, _Accuracy | None] = {
-    "default": _Accuracy(0.9, 6, (4, 4, 4, 4, 2, 2, 0), (6.9, 4.5, 4.5), 4.5, 0.12, 1.0),
+    "default": _Accuracy(1.0, 5, (4, 4, 4, 4, 2, 2), (6.9, 4.5, 4.5), 4.5, 0.12, 1.0),
     "high": _Accuracy(0.55, 12, (16,) * 8 + (8,) * 5, (1e3, 1e3, 1e3), 7.5, 0.3, 0.0),
     "draft": _Accuracy(1.2, 3, (4, 4, 2, 2), (4.5, 4.5, 4.5), 4.5, 0.12, 0.0),
     "fast": None,
@@ -507,7 +508,7 @@ def _tail(x: Any) -> Any:
     """1 − Φ(x), ends at ±9; relative error 2e-11 for x > 0 (minimax)."""
     t = dr.minimum(dr.abs(x), _REACH)
     ratio = polynomial(t, _MILLS_NUMERATOR) / polynomial(t, _MILLS_DENOMINATOR)
-    tail = (1.0 / math.sqrt(2.0 * math.pi)) * dr.exp(-0.5 * t * t) * ratio
+    tail = (1.0 / math.sqrt(2.0 * math.pi)) * exp2((-0.5 / _LN2) * t * t) * ratio
     return dr.select(x < 0.0, 1.0 - tail, tail)
 
 
@@ -547,9 +548,12 @@ def _between(below: Any, above: Any, low: Any, high: Any) -> tuple[Any, Any]:
     share = dr.maximum((1.0 - low) - high, 0.0)
     left, right = dr.fma(share, below, low), dr.fma(share, above, high)
     # x with the smaller of the two tails p, as a rational function of √(−2 log p)
-    t = dr.sqrt(-2.0 * dr.log(dr.clip(dr.minimum(left, right), 1e-18, 0.5)))
+    lower = left < right
+    p = dr.select(lower, left, right)
+    p = dr.select(p < 1e-18, 1e-18, dr.select(p > 0.5, 0.5, p))
+    t = dr.sqrt((-2.0 * _LN2) * log2(p))
     x = polynomial(t, _SLOPE_NUMERATOR) / polynomial(t, _SLOPE_DENOMINATOR)
-    return dr.select(left < right, -x, x), share
+    return dr.select(lower, -x, x), share
 
 
 def _transported_average(
