@@ -121,14 +121,16 @@ def _pairs(count: int) -> list[tuple[float, float]]:
     return [(x, w) for x, w in _hermite(count) if x > 0.0]
 
 
-#: E2^{r²} 5-1 as pairs of points (u, ±v), each of this weight, besides the origin, which has half of the whole.
-_SEVEN = ((0.0, 2.0), (math.sqrt(3.0), 1.0), (-math.sqrt(3.0), 1.0))
-_SEVEN_WEIGHT = 1.0 / 12.0
-
-
 def _clear_rules() -> tuple[list[tuple[float, ...]], list[tuple[int, int]]]:
-    """Rules of 7, 12 and 26 points, pairs (u, ±v) with the weight of each point; where each begins, and its length."""
-    seven = [(0.0, 0.0, 0.25), *((u, v, _SEVEN_WEIGHT) for u, v in _SEVEN)]
+    """Rules of 7, 12 and 26 points.
+
+    Returns
+    -------
+    pairs, ranges
+        Pairs (u, ±v), weight of each of the two points and u² + v²; where each rule begins, and its length.
+    """
+    three = math.sqrt(3.0)
+    seven = [(0.0, 0.0, 0.25), (0.0, 2.0, 1.0 / 12.0), (three, 1.0, 1.0 / 12.0), (-three, 1.0, 1.0 / 12.0)]
     s, t = (math.sqrt((9.0 - sign * 3.0 * math.sqrt(5.0)) / 4.0) for sign in (1.0, -1.0))
     w_s, w_t = ((5.0 + sign * 2.0 * math.sqrt(5.0)) / 45.0 for sign in (1.0, -1.0))
     six = math.sqrt(6.0)
@@ -140,7 +142,8 @@ def _clear_rules() -> tuple[list[tuple[float, ...]], list[tuple[int, int]]]:
     pairs: list[tuple[float, ...]] = []
     for rule in (seven, twelve, product):
         ranges.append((len(pairs), len(rule)))
-        pairs.extend((*pair, 0.0) for pair in rule)
+        # rounded, so that points that are as far out share what depends on it
+        pairs.extend((u, v, w, round(u * u + v * v, 14)) for u, v, w in rule)
     return pairs, ranges
 
 
@@ -176,7 +179,10 @@ def _row_rules() -> _Tables:
         if rule is None:
             continue
         tables.ranges_of[name] = len(tables.rows), 2 * rule.half + 1, len(tables.columns)
-        for j, (below, above, weight) in enumerate(_trapezoid(rule.step, 2 * rule.half + 1), -rule.half):
+        trapezoid = _trapezoid(rule.step, 2 * rule.half + 1)
+        # from the middle on, so that rows of as many points follow each other
+        for j in sorted(range(-rule.half, rule.half + 1), key=abs):
+            below, above, weight = trapezoid[rule.half + j]
             reach = math.sqrt((rule.half + 0.4) ** 2 - j * j)
             tables.rows.append((below, above, weight, min(rule.half, int(reach + 0.5))))
             count = rule.across[abs(j)]
@@ -309,31 +315,36 @@ def facet_average(
     UInt = dr.uint32_array_t(F)
     if accuracy == "fast":
         return _transported_average(integrand, size, geometry, sigma, args)
-    if rule == "seven":
-        return _seven(integrand, geometry, sigma, args)
-
-    index: Any = None
-    if rule is None:
-        index = choose_rule(*_edges(geometry, sigma), sigma, steepness, accuracy, lambda x: dr.opaque(F, x))
-
-    def lanes(name: str) -> Any:
-        return index == RULES.index(name) if rule is None else name == rule
-
     state = sigma, tuple(geometry), args
-    sums = []
-    if rule in (None, "twelve", "many"):
-        sums.append(_sum_clear(integrand, size, state, [lanes(name) for name in RULES[:3]]))
-    if rule in (None, "one_edge", "both_edges"):
-        # the rule enters as opaque data, so that the accuracies share one kernel
-        rows = _Rows(
-            *(dr.opaque(UInt, x) for x in _TABLES.ranges_of[accuracy]),
-            *(_packets(F, numbers) for numbers in _TABLES[1:]),
-        )
-        if rule in (None, "one_edge"):
-            sums.append(_sum_edge(integrand, size, state, lanes("one_edge"), rows))
-        if rule in (None, "both_edges"):
-            sums.append(_sum_wedge(integrand, size, state, lanes("both_edges"), rows))
-    return _added(*sums)
+    if rule in RULES[:3]:
+        return _sum_clear(integrand, size, state, _CLEAR.__getitem__, *_CLEAR_RANGES[RULES.index(rule)])
+    tables = [_packets(F, numbers) for numbers in _TABLES[1:]]
+    first, count, first_column = _TABLES.ranges_of[accuracy]
+    if rule == "one_edge":
+        # a loop over rows of as many points, without another one within them
+        own = _TABLES.ranges[first : first + count]
+        parts = [
+            _Rows(first + own.index(across), UInt(own.count(across)), 0, *tables)._replace(
+                ranges=lambda _, across=across: across, pairs=_TABLES.pairs.__getitem__
+            )
+            for across in sorted(set(own))
+        ]
+        return _added(*(_sum_edge(integrand, size, state, True, part) for part in parts))
+
+    # the accuracy enters as opaque data, so that all share one kernel
+    rows = _Rows(*(dr.opaque(UInt, x) for x in (first, count, first_column)), *tables)
+    if rule == "both_edges":
+        return _sum_wedge(integrand, size, state, True, rows)
+    index = choose_rule(*_edges(geometry, sigma), sigma, steepness, accuracy, lambda x: dr.opaque(F, x))
+    start, count = UInt(0), UInt(0)
+    for place, (first, length) in enumerate(_CLEAR_RANGES):
+        start = dr.select(index == place, UInt(first), start)
+        count = dr.select(index == place, UInt(length), count)
+    return _added(
+        _sum_clear(integrand, size, state, _packets(F, _CLEAR), start, count),
+        _sum_edge(integrand, size, state, index == RULES.index("one_edge"), rows),
+        _sum_wedge(integrand, size, state, index == RULES.index("both_edges"), rows),
+    )
 
 
 def _pair(
@@ -346,10 +357,11 @@ def _pair(
     q, twist = tilt_rotation(inverse * dr.fma(u, geometry.cos_r, geometry.sin_r), inverse * v)
     x, y = -u * cos_phi, -u * sin_phi
     sides = []
-    for turn, side in ((twist, v), (-twist, -v)):
+    # both are one where v is the number 0
+    for turn, side in ((twist, v), (-twist, -v))[: 2 if dr.is_jit_v(v) else 1]:
         slopes = dr.fma(side, sin_phi, x), dr.fma(-side, cos_phi, y)
         sides.append(integrand(_facet(*slopes, inverse, geometry, mu_r, (q, turn)), geometry, args))
-    return [weight * (a + b) for a, b in zip(*sides, strict=True)]
+    return [weight * (a + b) for a, b in zip(sides[0], sides[-1], strict=True)]
 
 
 def _facet(x: Any, y: Any, inverse: Any, geometry: Geometry, mu_r: Any, turn_r: Any) -> Facet:
@@ -380,32 +392,16 @@ def _added(*values: list[Any]) -> list[Any]:
     return [sum(x[1:], x[0]) for x in zip(*values, strict=True)]
 
 
-def _seven(integrand: Callable[..., Any], geometry: Geometry, sigma: Any, args: Any) -> list[Any]:
-    """Seven points of the whole plane in all lanes, without a loop: six of them have the same length."""
-    inverse = dr.rsqrt(dr.fma(4.0 * sigma, sigma, 1.0))
-    turn = tilt_rotation(geometry.sin_r, 0.0)
-    flat = integrand(_facet(0.0, 0.0, 1.0, geometry, geometry.cos_r, turn), geometry, args)
-    pairs = [
-        _pair(integrand, sigma * u, sigma * v, inverse, _SEVEN_WEIGHT, tuple(geometry), args)
-        for u, v in _SEVEN
-    ]
-    return _added([0.5 * value for value in flat], *pairs)
-
-
-def _sum_clear(integrand: Callable[..., Any], size: int, state: Any, lanes: list[Any]) -> list[Any]:
-    """Pairs of points of the whole plane; ``lanes`` of each of the rules."""
-    F = type(state[0])
-    UInt = dr.uint32_array_t(F)
-    points = _packets(F, _CLEAR)
-    start, count = UInt(0), UInt(0)
-    for mask, (first, length) in zip(lanes, _CLEAR_RANGES, strict=True):
-        start, count = dr.select(mask, UInt(first), start), dr.select(mask, UInt(length), count)
+def _sum_clear(
+    integrand: Callable[..., Any], size: int, state: Any, points: Callable[[Any], Any], start: Any, count: Any
+) -> list[Any]:
+    """Pairs of points of the whole plane."""
 
     def pair(j: Any, sigma: Any, vectors: Any, args: Any) -> list[Any]:
-        u, v, weight, _ = points(start + j)
-        u, v = sigma * u, sigma * v
-        inverse = dr.rsqrt(dr.fma(u, u, dr.fma(v, v, 1.0)))
-        return _pair(integrand, u, v, inverse, weight, vectors, args)
+        u, v, weight, length2 = points(start + j)
+        inverse = dr.rsqrt(dr.fma(length2 * sigma, sigma, 1.0))
+        v = sigma * v if dr.is_jit_v(v) or v else 0.0
+        return _pair(integrand, sigma * u, v, inverse, weight, vectors, args)
 
     return summed(pair, count, size, state, label="facets")
 
@@ -434,7 +430,7 @@ def _sum_edge(integrand: Callable[..., Any], size: int, state: Any, lanes: Any, 
         geometry = Geometry(*vectors)
         (f, e), c_near, *_ = _nearer_edge_axes(geometry, *_edges(geometry, sigma))
         below, above, weight, _ = rows.rows(rows.first + j)
-        first, count = (UInt(x) for x in rows.ranges(rows.first + j))
+        first, count = (x if isinstance(x, int) else UInt(x) for x in rows.ranges(rows.first + j))
         w, share = _between(below, above, 0.0, _tail(c_near))
         w = sigma * w
 
