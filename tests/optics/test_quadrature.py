@@ -188,6 +188,15 @@ def test_choice_of_rule(jit, accuracy, c_i, c_r, sigma, k, rule):
     assert RULES[choose_rule(*arrays, accuracy)[0]] == rule
 
 
+def test_number_of_points():
+    """What a direction costs: points of each of the default rules."""
+    first, count, _ = quadrature._TABLES.ranges_of["default"]
+    clear = [2 * length for _, length in quadrature._CLEAR_RANGES]
+    one = sum(2 * pairs for _, pairs in quadrature._TABLES.ranges[first : first + count])
+    both = sum(2 * row[3] for row in quadrature._TABLES.rows[first : first + count])
+    assert clear == [8, 14, 26] and (one, both) == (36, 128)
+
+
 @pytest.mark.slow
 def test_default_accuracy_of_random_paints():
     """docs/model.md, section 4: 1e-5 of f00 for σ ≤ 0.1 and zenith angles up to 75°, but for few cases."""

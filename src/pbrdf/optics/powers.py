@@ -69,7 +69,7 @@ def log2(x: Any) -> Any:
     if not dr.is_jit_v(x):
         return dr.log2(x)
     F, own = _format(x)
-    Int = dr.int32_array_t(F) if own is _SINGLE else dr.int64_array_t(F)
+    Int: Any = dr.int32_array_t(F) if own is _SINGLE else dr.int64_array_t(F)
     bits: Any = dr.reinterpret_array(Int, dr.detach(x))
     octave = (bits - own.lowest) >> own.mantissa
     mantissa: Any = dr.reinterpret_array(F, bits - (octave << own.mantissa))
@@ -87,7 +87,7 @@ def exp2(x: Any) -> Any:
     if not dr.is_jit_v(x):
         return dr.exp2(x)
     F, own = _format(x)
-    Int = dr.int32_array_t(F) if own is _SINGLE else dr.int64_array_t(F)
+    Int: Any = dr.int32_array_t(F) if own is _SINGLE else dr.int64_array_t(F)
     y = dr.detach(x)
     # selects in this order keep NaN, in one instruction each
     y = dr.select(y < own.least, own.least, dr.select(y > own.largest, own.largest, y))

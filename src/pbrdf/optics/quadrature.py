@@ -97,7 +97,7 @@ class _Accuracy(NamedTuple):
 #: ``draft`` is for searching (errors up to 1 % where the wedge cuts in), ``high`` for reference values, ``fast``
 #: for rendering: a rule of its own, see :mod:`pbrdf.optics.transport`.
 ACCURACIES: dict[str, _Accuracy | None] = {
-    "default": _Accuracy(1.0, 5, (4, 4, 4, 4, 2, 2), (6.9, 4.5, 4.5), 4.5, 0.12, 1.0),
+    "default": _Accuracy(0.9, 6, (4, 4, 4, 4, 2, 2, 0), (6.9, 4.5, 4.5), 4.5, 0.12, 1.0),
     "high": _Accuracy(0.55, 12, (16,) * 8 + (8,) * 5, (1e3, 1e3, 1e3), 7.5, 0.3, 0.0),
     "draft": _Accuracy(1.2, 3, (4, 4, 2, 2), (4.5, 4.5, 4.5), 4.5, 0.12, 0.0),
     "fast": None,
@@ -323,13 +323,13 @@ def facet_average(
     if rule == "one_edge":
         # a loop over rows of as many points, without another one within them
         own = _TABLES.ranges[first : first + count]
-        parts = [
-            _Rows(first + own.index(across), UInt(own.count(across)), 0, *tables)._replace(
-                ranges=lambda _, across=across: across, pairs=_TABLES.pairs.__getitem__
+        rows = _Rows(first, UInt(count), 0, *tables)._replace(pairs=_TABLES.pairs.__getitem__)
+        return _added(
+            *(
+                _sum_edge(integrand, size, state, True, _alike(rows, own, across))
+                for across in sorted({pairs for pairs in own if pairs[1] > 0})
             )
-            for across in sorted(set(own))
-        ]
-        return _added(*(_sum_edge(integrand, size, state, True, part) for part in parts))
+        )
 
     # the accuracy enters as opaque data, so that all share one kernel
     rows = _Rows(*(dr.opaque(UInt, x) for x in (first, count, first_column)), *tables)
@@ -345,6 +345,12 @@ def facet_average(
         _sum_edge(integrand, size, state, index == RULES.index("one_edge"), rows),
         _sum_wedge(integrand, size, state, index == RULES.index("both_edges"), rows),
     )
+
+
+def _alike(rows: _Rows, ranges: list[tuple[float, ...]], own: tuple[float, ...]) -> _Rows:
+    """Those of some rows that have this range of pairs; they follow each other."""
+    first, count = rows.first + ranges.index(own), type(rows.count)(ranges.count(own))
+    return rows._replace(first=first, count=count, ranges=lambda _: own)
 
 
 def _pair(

@@ -27,7 +27,9 @@ __all__ = [
     "TRANSMITTANCES",
     "average_steepness",
     "exit_and_entry_polarisation",
+    "exit_and_entry_sums",
     "exit_polarisation",
+    "exit_sums",
     "visible_means",
 ]
 
@@ -46,7 +48,7 @@ def exit_polarisation(
     normalization: str = "weighted",
     transmittance: str = "flux",
     accuracy: str = "default",
-    rule: str | None = None,
+    sums: list[Any] | None = None,
 ) -> tuple[Any, Any, Any]:
     """First column (I, Q, U) of D_v, paper eqs (12)-(13), in the surface's frame of the reflected ray.
 
@@ -60,10 +62,35 @@ def exit_polarisation(
         Reading of eq. (13) and of M_t, see the module.
     accuracy
         Accuracy of the average over the facets.
-    rule
-        How all lanes average, where that is known, see :func:`pbrdf.optics.quadrature.facet_average`.
+    sums
+        What :func:`exit_sums` gave, if it was asked before.
     """
+    if sums is None:
+        sums = exit_sums(geometry, sigma, n, kappa, k, normalization, transmittance, accuracy)
+    intensity, q, u = sums[:3]
+    if normalization == "weighted":
+        scale = _inverse(sums[3])
+    else:
+        solid_angle, integral = visible_means(geometry, k, accuracy, _unit_of_weights(geometry, sigma))
+        scale = solid_angle * _inverse(integral)
+    return intensity * scale, q * scale, u * scale
 
+
+def exit_sums(
+    geometry: Geometry,
+    sigma: Any,
+    n: Any,
+    kappa: Any | None,
+    k: Any,
+    normalization: str = "weighted",
+    transmittance: str = "flux",
+    accuracy: str = "default",
+    rule: str | None = None,
+) -> list[Any]:
+    """Averages over the facets that :func:`exit_polarisation` is made of, parameters as there.
+
+    ``rule`` says how all lanes average, where that is known, see :func:`pbrdf.optics.quadrature.facet_average`.
+    """
     unit = _unit_of_weights(geometry, sigma)
 
     def integrand(facet: Facet, geometry: Geometry, args: Any) -> tuple[Any, ...]:
@@ -77,14 +104,7 @@ def exit_polarisation(
     weighted = normalization == "weighted"
     steepness = average_steepness(dr.detach(k), normalization)
     size = 4 if weighted else 3
-    found = facet_average(integrand, size, geometry, sigma, (n, kappa, k), accuracy, steepness, rule)
-    intensity, q, u = found[:3]
-    if weighted:
-        scale = _inverse(found[3])
-    else:
-        solid_angle, integral = visible_means(geometry, k, accuracy, unit)
-        scale = solid_angle * _inverse(integral)
-    return intensity * scale, q * scale, u * scale
+    return facet_average(integrand, size, geometry, sigma, (n, kappa, k), accuracy, steepness, rule)
 
 
 def exit_and_entry_polarisation(
@@ -94,14 +114,31 @@ def exit_and_entry_polarisation(
     kappa: Any | None,
     k: Any,
     accuracy: str = "default",
-    rule: str | None = None,
+    sums: list[Any] | None = None,
 ) -> list[list[Any]]:
     """3 x 3 block (I, Q, U) of D_b = E[W T_out D_s T_in]/E[W]: light enters and leaves through the facet.
 
     Beyond the paper (docs/model.md, section 3): with the transmittance of flux on both ways and both frame
-    rotations, Helmholtz reciprocity holds for the whole Mueller matrix.
+    rotations, Helmholtz reciprocity holds for the whole Mueller matrix. ``sums`` are those of
+    :func:`exit_and_entry_sums`, if it was asked before.
     """
+    if sums is None:
+        sums = exit_and_entry_sums(geometry, sigma, n, kappa, k, accuracy)
+    E_W, *block = sums
+    scale = _inverse(E_W)
+    return [[block[3 * i + j] * scale for j in range(3)] for i in range(3)]
 
+
+def exit_and_entry_sums(
+    geometry: Geometry,
+    sigma: Any,
+    n: Any,
+    kappa: Any | None,
+    k: Any,
+    accuracy: str = "default",
+    rule: str | None = None,
+) -> list[Any]:
+    """Averages that :func:`exit_and_entry_polarisation` is made of; ``rule`` as in :func:`exit_sums`."""
     unit = _unit_of_weights(geometry, sigma)
 
     def integrand(facet: Facet, geometry: Geometry, args: Any) -> tuple[Any, ...]:
@@ -112,9 +149,7 @@ def exit_and_entry_polarisation(
         return (W, *(W * out * enter for out in column for enter in row))
 
     steepness = average_steepness(dr.detach(k))
-    E_W, *block = facet_average(integrand, 10, geometry, sigma, (n, kappa, k), accuracy, steepness, rule)
-    scale = _inverse(E_W)
-    return [[block[3 * i + j] * scale for j in range(3)] for i in range(3)]
+    return facet_average(integrand, 10, geometry, sigma, (n, kappa, k), accuracy, steepness, rule)
 
 
 def average_steepness(k: Any, normalization: str = "weighted") -> Any:
