@@ -8,7 +8,7 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from pbrdf.models import DoubleGauss, evaluation
+from pbrdf.models import DoubleGauss, ReciprocalDoubleGauss, double_gauss, evaluation
 
 MODEL = DoubleGauss(sigma=0.04, n=1.5, a=1.0, k=1.2, b=0.2, t=0.5)
 GRID = np.linspace(0.0, 1.4, 30)[:, None], np.linspace(0.0, 1.3, 50)[None, :], 0.7
@@ -62,3 +62,31 @@ def test_no_copies(monkeypatch):
     finally:
         tracemalloc.stop()
     assert peak < 1.1 * result.nbytes
+
+
+@pytest.mark.parametrize("kind", [DoubleGauss, ReciprocalDoubleGauss])
+@pytest.mark.parametrize(
+    ("sigma", "options"),
+    [(0.1, {}), (np.linspace(0.02, 0.1, 2000), {"kappa": 0.7}), (0.1, {"accuracy": "draft"}), (0.25, {})],
+)
+def test_averages_found_beforehand(monkeypatch, kind, sigma, options):
+    """Of many directions those of one rule are averaged together: the matrices are the same, horizon included."""
+    rng = np.random.default_rng(4)
+    theta = rng.uniform(0.0, 0.5 * np.pi, (2, 2000))
+    theta[0, :7] = 0.5 * np.pi
+    model = kind(sigma, 1.6, 1.0, 1.3, 0.2, 0.7, **options)
+    angles = (*theta, rng.uniform(-np.pi, np.pi, 2000))
+    expected = model.mueller(*angles)
+    monkeypatch.setattr(double_gauss, "_FEW", 1)
+    found = model.mueller(*angles)
+    np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-12)
+    assert np.all(found[:7] == 0.0)
+
+
+def test_averages_found_beforehand_where_one_ray_is_the_same(monkeypatch):
+    """Scalars among the angles, and no direction that takes the rule of fewest points."""
+    monkeypatch.setattr(double_gauss, "_FEW", 1)
+    angles = 1.25, np.linspace(0.0, 1.4, 500), np.linspace(0.0, 3.0, 500)
+    model = DoubleGauss(0.1, 1.6, 1.0, 1.3, 0.2, 0.7, normalization="visible")
+    parts = [model.mueller(1.25, r, phi) for r, phi in zip(*angles[1:], strict=True)][::50]
+    np.testing.assert_allclose(model.mueller(*angles)[::50], parts, rtol=1e-10, atol=1e-12)

@@ -1,4 +1,4 @@
-"""Powers: the usual ones in double precision, polynomials in single, the same derivatives in both."""
+"""Powers by polynomials, and their derivatives."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pbrdf.backend import get_backend
-from pbrdf.optics.powers import power
+from pbrdf.optics.powers import exp2, log2, power
 
 
 @pytest.fixture(scope="module")
@@ -52,15 +52,28 @@ def test_double_precision_and_numbers(jit):
     assert power(0.3, 1.7) == pytest.approx(0.3**1.7, rel=1e-14)
 
 
-def test_derivatives_in_single_precision(single):
+def test_double_precision_at_the_ends(jit):
+    """1^y and x^0 are exact; what is too small or too large is the least or largest power of two; NaN stays."""
+    y = jit(np.linspace(-3.0, 19.0, 50))
+    assert np.all(power(jit([1.0]), y).numpy() == 1.0)
+    assert np.all(power(jit(np.geomspace(1e-18, 1e5, 50)), jit([0.0])).numpy() == 1.0)
+    found = exp2(jit([-2000.0, 2000.0, np.nan])).numpy()
+    assert found[0] == 2.0**-1022 and found[1] == 2.0**1023 and np.isnan(found[2])
+    x = np.geomspace(1e-300, 1e300, 10_001)
+    np.testing.assert_allclose(log2(jit(x)).numpy(), np.log2(x), rtol=1e-14, atol=3e-14)
+
+
+@pytest.mark.parametrize("double", [False, True])
+def test_derivatives(single, jit, double):
     """d(x^y)/dx = y x^(y−1) and d(x^y)/dy = x^y log x."""
     import drjit as dr
 
     x, y = cases(1000)
     x = np.maximum(x, np.float32(1e-3))
-    a, b = single(x), single(y)
+    Float, tolerance = (jit, 1e-12) if double else (single, 1e-4)
+    a, b = Float(x), Float(y)
     dr.enable_grad(a, b)
     dr.backward(power(a, b))
     x, y = x.astype(float), y.astype(float)
-    np.testing.assert_allclose(a.grad.numpy(), y * x ** (y - 1.0), rtol=1e-4, atol=1e-6)
-    np.testing.assert_allclose(b.grad.numpy(), x**y * np.log(x), rtol=1e-4, atol=1e-6)
+    np.testing.assert_allclose(a.grad.numpy(), y * x ** (y - 1.0), rtol=tolerance, atol=1e-6)
+    np.testing.assert_allclose(b.grad.numpy(), x**y * np.log(x), rtol=tolerance, atol=1e-6)

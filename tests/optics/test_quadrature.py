@@ -31,8 +31,8 @@ IDS = ["-".join(map(str, h)) for h in HARD]
 def average(jit):
     """(θ_i, θ_r, φ, σ, k, accuracy) → ∫P, ∫P W, ∫P W m_x, ∫P W m_x m_y over lit and seen facets, (4, N)."""
 
-    def integrand(m, mu_i, mu_r, geometry, args):
-        W = minnaert_shape(mu_i, mu_r, args[0])
+    def integrand(facet, geometry, args):
+        m, W = facet.normal, minnaert_shape(facet.mu_i, facet.mu_r, args[0])
         return 1.0, W, W * m[0], W * m[0] * m[1]
 
     def function(theta_i, theta_r, phi, sigma, k, accuracy="default"):
@@ -121,8 +121,8 @@ def test_lit_and_seen_probability(average, accuracy, phi_max, tolerance):
 def test_moments_of_a_clear_wedge(average, jit):
     """Both rays near the normal: every facet is lit and seen; slopes have mean 0 and variance σ²."""
 
-    def integrand(m, mu_i, mu_r, geometry, args):
-        x, y = m[0] / m[2], m[1] / m[2]
+    def integrand(facet, geometry, args):
+        x, y = (m / facet.normal[2] for m in facet.normal[:2])
         return 1.0, x, y, x * x, y * y, x * y, x * x * x * x
 
     for sigma in (0.04, 0.1):
@@ -186,6 +186,15 @@ def test_choice_of_rule(jit, accuracy, c_i, c_r, sigma, k, rule):
     assert RULES[choose_rule(c_i, c_r, sigma, steepness, accuracy)] == rule
     arrays = (jit(x) for x in (c_i, c_r, sigma, steepness))
     assert RULES[choose_rule(*arrays, accuracy)[0]] == rule
+
+
+def test_number_of_points():
+    """What a direction costs: points of each of the default rules."""
+    first, count, _ = quadrature._TABLES.ranges_of["default"]
+    clear = [2 * length for _, length in quadrature._CLEAR_RANGES]
+    one = sum(2 * pairs for _, pairs in quadrature._TABLES.ranges[first : first + count])
+    both = sum(2 * row[3] for row in quadrature._TABLES.rows[first : first + count])
+    assert clear == [8, 14, 26] and (one, both) == (36, 128)
 
 
 @pytest.mark.slow

@@ -94,9 +94,9 @@ def test_tilt_rotation_is_the_squared_projection():
     s_m = np.cross(k, m)
     sin2 = s_m @ s_m
     p_m = np.cross(s_m, k) / np.sqrt(sin2)
-    q, u = tilt_rotation(tuple(m), tuple(p), tuple(s))
+    q, u = tilt_rotation(m @ p, m @ s)
     assert q == pytest.approx(sin2 * ((p_m @ p) ** 2 - (p_m @ s) ** 2), abs=1e-14)
     assert u == pytest.approx(sin2 * 2 * (p_m @ p) * (p_m @ s), abs=1e-14)
     # and vanishes, without division, for a facet seen face on
-    q, u = tilt_rotation(tuple(k), tuple(p), tuple(s))
+    q, u = tilt_rotation(k @ p, k @ s)
     assert abs(q) < 1e-15 and abs(u) < 1e-15

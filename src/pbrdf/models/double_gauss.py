@@ -15,15 +15,17 @@ from typing import Any, ClassVar, Self
 import drjit as dr
 import numpy as np
 
+from pbrdf.backend import get_backend
 from pbrdf.errors import ModelError
 from pbrdf.models.arrays import Matrix, to_numpy
 from pbrdf.models.base import Model
+from pbrdf.models.evaluation import horizon_guard
 from pbrdf.models.parameters import Option, Parameter
 from pbrdf.optics.diffuse import mrpv
 from pbrdf.optics.facet_reflection import facet_reflection, tan2_tilt
 from pbrdf.optics.facets import projected_area_density
 from pbrdf.optics.fresnel import mueller_reflection
-from pbrdf.optics.geometry import Geometry
+from pbrdf.optics.geometry import Geometry, geometry_from_angles
 from pbrdf.optics.quadrature import ACCURACIES, RULES, choose_rule, wedge_distance
 from pbrdf.optics.shadowing import SHADOWING
 from pbrdf.optics.transmission import (
@@ -31,7 +33,9 @@ from pbrdf.optics.transmission import (
     TRANSMITTANCES,
     average_steepness,
     exit_and_entry_polarisation,
+    exit_and_entry_sums,
     exit_polarisation,
+    exit_sums,
 )
 
 __all__ = [
@@ -132,6 +136,8 @@ class _GaussianFacets(Model):
     ablations: ClassVar[Mapping[str, Mapping[str, float]]] = {"unpolarised body": {"t": 0.0}}
     #: The rule by which all directions average over the facets, None where each takes its own.
     facet_rule: str | None = None
+    #: Averages found before, and which directions do not take them (None: all do).
+    facet_sums: tuple[list[Any], Any] | None = None
 
     def for_rendering(self) -> Self:
         """``fast`` where that is exact enough."""
@@ -141,14 +147,15 @@ class _GaussianFacets(Model):
     def lane_groups(
         self, scalars: Mapping[str, Any], floats: Mapping[str, Any], size: int, part: str
     ) -> Sequence[tuple[Self, Any]]:
-        """Directions by the rule of the average over the facets."""
+        """All directions together, once the averages over the facets are found: the directions by their rule."""
         accuracy = self.chosen["accuracy"]
         if part == "specular" or accuracy == "fast":
             return [(self, None)]
         normalization = self.chosen.get("normalization", "weighted")
 
         def rule(theta_i: Any, theta_r: Any, sigma: Any, k: Any) -> Any:
-            c_i, c_r = (wedge_distance(dr.cos(theta), dr.sin(theta), sigma) for theta in (theta_i, theta_r))
+            (sin_i, cos_i), (sin_r, cos_r) = dr.sincos(theta_i), dr.sincos(theta_r)
+            c_i, c_r = wedge_distance(cos_i, sin_i, sigma), wedge_distance(cos_r, sin_r, sigma)
             return choose_rule(c_i, c_r, sigma, average_steepness(k, normalization), accuracy)
 
         # the rule goes up with each of these
@@ -163,10 +170,62 @@ class _GaussianFacets(Model):
             return [(self, None)]
         found = rule(floats["theta_i"], floats["theta_r"], floats["sigma"], floats["k"])
         dr.eval(found)
-        groups: list[tuple[Self, Any]] = [
-            (self._with_rule(j), dr.compress(found == j)) for j in range(first, last + 1)
-        ]
-        return [(model, lanes) for model, lanes in groups if dr.width(lanes) > 0]
+        # the rule of fewest points is taken with the rest of the kernel: who takes it need not be listed
+        groups = {RULES[j]: dr.compress(found == j) for j in range(max(first, 1), last + 1)}
+        groups = {name: lanes for name, lanes in groups.items() if dr.width(lanes)}
+        return [(self._with_sums(groups, scalars, floats, size), None)]
+
+    def _with_sums(
+        self, groups: Mapping[str, Any], scalars: Mapping[str, Any], floats: Mapping[str, Any], size: int
+    ) -> Self:
+        """The same model with the averages of directions found, by groups of indices that take one rule.
+
+        Each group reads its directions where they are and writes the sums one after another: the matrices, which are
+        four times as long, are then all written in their order.
+        """
+        backend = get_backend()
+        Float, UInt32, Packet = backend.Float, backend.UInt32, backend.module.ArrayXf64
+        total, start, width = sum(dr.width(lanes) for lanes in groups.values()), 0, 0
+        place, found = dr.zeros(UInt32, size), None
+        for rule, lanes in groups.items():
+            taken = {
+                name: dr.opaque(Float, x) if isinstance(x, float) else dr.gather(Float, x, lanes)
+                for name, x in floats.items()
+            }
+            values = {p.name: taken[p.name] for p in self.parameters}
+            absent = [p.name for p in self.parameters if p.vanishing and not np.any(scalars[p.name])]
+            values |= dict.fromkeys(absent)
+            theta_i, theta_r, _ = horizon_guard(taken["theta_i"], taken["theta_r"])
+            sums = self._averages(geometry_from_angles(theta_i, theta_r, taken["phi"]), values, rule)
+            if found is None:
+                width = len(sums)
+                found = dr.empty(Float, total * width)
+            position = dr.arange(UInt32, dr.width(lanes)) + dr.opaque(UInt32, start)
+            dr.scatter(found, Packet(sums), position)
+            dr.scatter(place, position + 1, lanes)
+            dr.eval(found, place)
+            start += dr.width(lanes)
+        if found is None:
+            return self._with_rule(0)
+        own = place == 0
+        packet: Any = dr.gather(Packet, found, dr.select(own, 0, place - 1), shape=(width, size))
+        other = self._with_rule(0)
+        object.__setattr__(other, "facet_sums", (list(packet), own if total < size else None))
+        return other
+
+    def _averages(self, geometry: Geometry, values: Mapping[str, Any], rule: str | None) -> list[Any]:
+        """Averages over the facets that the polarised body is made of."""
+        raise NotImplementedError
+
+    def _sums(self, geometry: Geometry, values: Mapping[str, Any]) -> list[Any]:
+        """The same, where they were found before from there."""
+        if self.facet_sums is None:
+            return self._averages(geometry, values, self.facet_rule)
+        sums, own = self.facet_sums
+        if own is None:
+            return sums
+        here = self._averages(geometry, values, self.facet_rule)
+        return [dr.select(own, a, b) for a, b in zip(here, sums, strict=True)]
 
     def _with_rule(self, index: int) -> Self:
         """The same model for directions that all take one rule."""
@@ -233,6 +292,19 @@ class DoubleGauss(_GaussianFacets):
             self._add_diffuse(f, geometry, values, f_rpv)
         return f
 
+    def _averages(self, geometry: Geometry, values: Mapping[str, Any], rule: str | None) -> list[Any]:
+        return exit_sums(
+            geometry,
+            values["sigma"],
+            values["n"],
+            values["kappa"],
+            values["k"],
+            self.chosen["normalization"],
+            self.chosen["transmittance"],
+            self.chosen["accuracy"],
+            rule,
+        )
+
     def _add_diffuse(self, f: Matrix, geometry: Geometry, values: Mapping[str, Any], f_rpv: Any) -> None:
         """Add f_rpv [(1 − t) D_s + t D_v], paper eq. (11)."""
         intensity, q, u = exit_polarisation(
@@ -244,7 +316,7 @@ class DoubleGauss(_GaussianFacets):
             self.chosen["normalization"],
             self.chosen["transmittance"],
             self.chosen["accuracy"],
-            self.facet_rule,
+            self._sums(geometry, values),
         )
         t = values["t"]
         polarised = f_rpv * t
@@ -272,7 +344,7 @@ class ReciprocalDoubleGauss(_GaussianFacets):
         if part != "specular":
             f_rpv = mrpv(geometry.cos_i, geometry.cos_r, geometry.cos_scattering, values["a"], k, values["b"])
             block = exit_and_entry_polarisation(
-                geometry, sigma, n, kappa, k, self.chosen["accuracy"], self.facet_rule
+                geometry, sigma, n, kappa, k, self.chosen["accuracy"], self._sums(geometry, values)
             )
             polarised = f_rpv * t
             f[0][0] = f[0][0] + (f_rpv - polarised)
@@ -280,3 +352,7 @@ class ReciprocalDoubleGauss(_GaussianFacets):
                 for j in range(3):
                     f[i][j] = f[i][j] + polarised * block[i][j]
         return f
+
+    def _averages(self, geometry: Geometry, values: Mapping[str, Any], rule: str | None) -> list[Any]:
+        sigma, n, kappa, k = (values[name] for name in ("sigma", "n", "kappa", "k"))
+        return exit_and_entry_sums(geometry, sigma, n, kappa, k, self.chosen["accuracy"], rule)

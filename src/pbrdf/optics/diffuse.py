@@ -14,7 +14,7 @@ from typing import Any
 import drjit as dr
 
 from pbrdf.optics.geometry import Geometry
-from pbrdf.optics.powers import power
+from pbrdf.optics.powers import exp2, log2, power
 
 __all__ = ["henyey_greenstein", "hot_spot", "minnaert_shape", "mrpv", "rpv"]
 
@@ -26,12 +26,18 @@ def minnaert_shape(cos_i: Any, cos_r: Any, k: Any, scale: Any | None = None) -> 
     floating-point numbers; products that it brings beyond 1e5 count as 1e5.
     """
     product = (cos_r + cos_i) * cos_r * cos_i
-    return power(product if scale is None else dr.minimum(product * scale, 1e5), k - 1.0)
+    if scale is not None:
+        product = product * scale
+        product = dr.select(product > 1e5, 1e5, product)
+    return power(product, k - 1.0)
 
 
 def mrpv(cos_i: Any, cos_r: Any, cos_scattering: Any, a: Any, k: Any, b: Any) -> Any:
     """f_rpv = (a/π) [(μ_r + μ_i) μ_r μ_i]^(k−1) exp(b cosω) in 1/sr, paper eq. (9)."""
-    return a * (1.0 / math.pi) * minnaert_shape(cos_i, cos_r, k) * dr.exp(b * cos_scattering)
+    exponent = dr.fma(
+        k - 1.0, log2((cos_r + cos_i) * cos_r * cos_i), b * cos_scattering * (1.0 / math.log(2.0))
+    )
+    return a * (1.0 / math.pi) * exp2(exponent)
 
 
 def henyey_greenstein(cos_scattering: Any, asymmetry: Any) -> Any:

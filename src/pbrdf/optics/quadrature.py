@@ -31,17 +31,39 @@ from typing import Any, NamedTuple
 import drjit as dr
 import numpy as np
 
-from pbrdf.optics.geometry import Geometry
-from pbrdf.optics.powers import polynomial
+from pbrdf.optics.geometry import Geometry, Vector
+from pbrdf.optics.powers import exp2, log2, polynomial
+from pbrdf.optics.reference_planes import tilt_rotation
 from pbrdf.optics.summation import differentiated, summed
 from pbrdf.optics.transport import transported_rows
 
-__all__ = ["ACCURACIES", "CARE", "RULES", "choose_rule", "facet_average", "table", "wedge_distance"]
+__all__ = ["ACCURACIES", "CARE", "RULES", "Facet", "choose_rule", "facet_average", "table", "wedge_distance"]
 
+_LN2 = math.log(2.0)
 #: Edges beyond this many standard deviations count as this far.
 _FAR = 50.0
 #: Bounds beyond this many standard deviations are out of reach of every node.
 _REACH = 9.0
+
+
+class Facet(NamedTuple):
+    """What an integrand gets to know of a facet.
+
+    Attributes
+    ----------
+    normal
+        Unit normal m.
+    mu_i, mu_r
+        Local cosines m·ω_i > 0 and m·ω_r > 0.
+    turn_i, turn_r
+        sin²β cos2χ and sin²β sin2χ for either ray, see :func:`pbrdf.optics.reference_planes.tilt_rotation`.
+    """
+
+    normal: Vector
+    mu_i: Any
+    mu_r: Any
+    turn_i: tuple[Any, Any]
+    turn_r: tuple[Any, Any]
 
 
 class _Accuracy(NamedTuple):
@@ -99,14 +121,16 @@ def _pairs(count: int) -> list[tuple[float, float]]:
     return [(x, w) for x, w in _hermite(count) if x > 0.0]
 
 
-#: E2^{r²} 5-1 as pairs of points (u, ±v), each of this weight, besides the origin, which has half of the whole.
-_SEVEN = ((0.0, 2.0), (math.sqrt(3.0), 1.0), (-math.sqrt(3.0), 1.0))
-_SEVEN_WEIGHT = 1.0 / 12.0
-
-
 def _clear_rules() -> tuple[list[tuple[float, ...]], list[tuple[int, int]]]:
-    """Rules of 7, 12 and 26 points, pairs (u, ±v) with the weight of each point; where each begins, and its length."""
-    seven = [(0.0, 0.0, 0.25), *((u, v, _SEVEN_WEIGHT) for u, v in _SEVEN)]
+    """Rules of 7, 12 and 26 points.
+
+    Returns
+    -------
+    pairs, ranges
+        Pairs (u, ±v), weight of each of the two points and u² + v²; where each rule begins, and its length.
+    """
+    three = math.sqrt(3.0)
+    seven = [(0.0, 0.0, 0.25), (0.0, 2.0, 1.0 / 12.0), (three, 1.0, 1.0 / 12.0), (-three, 1.0, 1.0 / 12.0)]
     s, t = (math.sqrt((9.0 - sign * 3.0 * math.sqrt(5.0)) / 4.0) for sign in (1.0, -1.0))
     w_s, w_t = ((5.0 + sign * 2.0 * math.sqrt(5.0)) / 45.0 for sign in (1.0, -1.0))
     six = math.sqrt(6.0)
@@ -118,7 +142,8 @@ def _clear_rules() -> tuple[list[tuple[float, ...]], list[tuple[int, int]]]:
     pairs: list[tuple[float, ...]] = []
     for rule in (seven, twelve, product):
         ranges.append((len(pairs), len(rule)))
-        pairs.extend((*pair, 0.0) for pair in rule)
+        # rounded, so that points that are as far out share what depends on it
+        pairs.extend((u, v, w, round(u * u + v * v, 14)) for u, v, w in rule)
     return pairs, ranges
 
 
@@ -154,7 +179,10 @@ def _row_rules() -> _Tables:
         if rule is None:
             continue
         tables.ranges_of[name] = len(tables.rows), 2 * rule.half + 1, len(tables.columns)
-        for j, (below, above, weight) in enumerate(_trapezoid(rule.step, 2 * rule.half + 1), -rule.half):
+        trapezoid = _trapezoid(rule.step, 2 * rule.half + 1)
+        # from the middle on, so that rows of as many points follow each other
+        for j in sorted(range(-rule.half, rule.half + 1), key=abs):
+            below, above, weight = trapezoid[rule.half + j]
             reach = math.sqrt((rule.half + 0.4) ** 2 - j * j)
             tables.rows.append((below, above, weight, min(rule.half, int(reach + 0.5))))
             count = rule.across[abs(j)]
@@ -263,8 +291,7 @@ def facet_average(
     Parameters
     ----------
     integrand
-        ``integrand(m, mu_i, mu_r, geometry, args)`` returns a tuple of ``size`` floats: the values for the
-        facet normal m = (m_x, m_y, m_z), with the local cosines μ_i' = m·ω_i > 0 and μ_r' = m·ω_r > 0.
+        ``integrand(facet, geometry, args)`` returns a tuple of ``size`` floats, the values for a :class:`Facet`.
     size
         Number of functions integrated.
     geometry, sigma
@@ -288,31 +315,42 @@ def facet_average(
     UInt = dr.uint32_array_t(F)
     if accuracy == "fast":
         return _transported_average(integrand, size, geometry, sigma, args)
-    if rule == "seven":
-        return _seven(integrand, geometry, sigma, args)
-
-    index: Any = None
-    if rule is None:
-        index = choose_rule(*_edges(geometry, sigma), sigma, steepness, accuracy, lambda x: dr.opaque(F, x))
-
-    def lanes(name: str) -> Any:
-        return index == RULES.index(name) if rule is None else name == rule
-
     state = sigma, tuple(geometry), args
-    sums = []
-    if rule in (None, "twelve", "many"):
-        sums.append(_sum_clear(integrand, size, state, [lanes(name) for name in RULES[:3]]))
-    if rule in (None, "one_edge", "both_edges"):
-        # the rule enters as opaque data, so that the accuracies share one kernel
-        rows = _Rows(
-            *(dr.opaque(UInt, x) for x in _TABLES.ranges_of[accuracy]),
-            *(_packets(F, numbers) for numbers in _TABLES[1:]),
+    if rule in RULES[:3]:
+        return _sum_clear(integrand, size, state, _CLEAR.__getitem__, *_CLEAR_RANGES[RULES.index(rule)])
+    tables = [_packets(F, numbers) for numbers in _TABLES[1:]]
+    first, count, first_column = _TABLES.ranges_of[accuracy]
+    if rule == "one_edge":
+        # a loop over rows of as many points, without another one within them
+        own = _TABLES.ranges[first : first + count]
+        rows = _Rows(first, UInt(count), 0, *tables)._replace(pairs=_TABLES.pairs.__getitem__)
+        return _added(
+            *(
+                _sum_edge(integrand, size, state, True, _alike(rows, own, across))
+                for across in sorted({pairs for pairs in own if pairs[1] > 0})
+            )
         )
-        if rule in (None, "one_edge"):
-            sums.append(_sum_edge(integrand, size, state, lanes("one_edge"), rows))
-        if rule in (None, "both_edges"):
-            sums.append(_sum_wedge(integrand, size, state, lanes("both_edges"), rows))
-    return _added(*sums)
+
+    # the accuracy enters as opaque data, so that all share one kernel
+    rows = _Rows(*(dr.opaque(UInt, x) for x in (first, count, first_column)), *tables)
+    if rule == "both_edges":
+        return _sum_wedge(integrand, size, state, True, rows)
+    index = choose_rule(*_edges(geometry, sigma), sigma, steepness, accuracy, lambda x: dr.opaque(F, x))
+    start, count = UInt(0), UInt(0)
+    for place, (first, length) in enumerate(_CLEAR_RANGES):
+        start = dr.select(index == place, UInt(first), start)
+        count = dr.select(index == place, UInt(length), count)
+    return _added(
+        _sum_clear(integrand, size, state, _packets(F, _CLEAR), start, count),
+        _sum_edge(integrand, size, state, index == RULES.index("one_edge"), rows),
+        _sum_wedge(integrand, size, state, index == RULES.index("both_edges"), rows),
+    )
+
+
+def _alike(rows: _Rows, ranges: list[tuple[float, ...]], own: tuple[float, ...]) -> _Rows:
+    """Those of some rows that have this range of pairs; they follow each other."""
+    first, count = rows.first + ranges.index(own), type(rows.count)(ranges.count(own))
+    return rows._replace(first=first, count=count, ranges=lambda _: own)
 
 
 def _pair(
@@ -322,57 +360,54 @@ def _pair(
     geometry = Geometry(*vectors)
     cos_phi, sin_phi = -geometry.s_r[1], geometry.s_r[0]
     mu_r = inverse * dr.fma(-u, geometry.sin_r, geometry.cos_r)
+    q, twist = tilt_rotation(inverse * dr.fma(u, geometry.cos_r, geometry.sin_r), inverse * v)
+    x, y = -u * cos_phi, -u * sin_phi
     sides = []
-    for side in (v, -v):
-        x, y = dr.fma(-u, cos_phi, side * sin_phi), dr.fma(-u, sin_phi, -side * cos_phi)
-        mu_i = inverse * dr.fma(-x, geometry.sin_i, geometry.cos_i)
-        sides.append(integrand((x * inverse, y * inverse, inverse), mu_i, mu_r, geometry, args))
-    return [weight * (a + b) for a, b in zip(*sides, strict=True)]
+    # both are one where v is the number 0
+    for turn, side in ((twist, v), (-twist, -v))[: 2 if dr.is_jit_v(v) else 1]:
+        slopes = dr.fma(side, sin_phi, x), dr.fma(-side, cos_phi, y)
+        sides.append(integrand(_facet(*slopes, inverse, geometry, mu_r, (q, turn)), geometry, args))
+    return [weight * (a + b) for a, b in zip(sides[0], sides[-1], strict=True)]
 
 
-def _facet(
+def _facet(x: Any, y: Any, inverse: Any, geometry: Geometry, mu_r: Any, turn_r: Any) -> Facet:
+    """A facet of slopes x and y, 1/√(1 + x² + y²) given, and what is known of it as seen by the viewer."""
+    mu_i = inverse * dr.fma(-x, geometry.sin_i, geometry.cos_i)
+    turn_i = tilt_rotation(inverse * dr.fma(x, geometry.cos_i, geometry.sin_i), -inverse * y)
+    return Facet((x * inverse, y * inverse, inverse), mu_i, mu_r, turn_i, turn_r)
+
+
+def _within(
     integrand: Callable[..., Any], x: Any, y: Any, inverse: Any, weight: Any, vectors: Any, args: Any
 ) -> list[Any]:
     """A facet of slopes x and y within the wedge, 1/√(1 + x² + y²) given."""
     geometry = Geometry(*vectors)
-    mu_i = inverse * dr.fma(-x, geometry.sin_i, geometry.cos_i)
-    mu_r = inverse * dr.fma(x, geometry.omega_r[0], dr.fma(y, geometry.omega_r[1], geometry.omega_r[2]))
-    valid = (mu_i > 0.0) & (mu_r > 0.0)  # but for rounding
-    mu_i, mu_r = dr.select(valid, mu_i, 1.0), dr.select(valid, mu_r, 1.0)
+    cos_phi, sin_phi = -geometry.s_r[1], geometry.s_r[0]
+    # slopes towards the viewer and across
+    u, v = -dr.fma(x, cos_phi, y * sin_phi), dr.fma(x, sin_phi, -y * cos_phi)
+    mu_r = inverse * dr.fma(-u, geometry.sin_r, geometry.cos_r)
+    turn_r = tilt_rotation(inverse * dr.fma(u, geometry.cos_r, geometry.sin_r), inverse * v)
+    facet = _facet(x, y, inverse, geometry, mu_r, turn_r)
+    valid = (facet.mu_i > 0.0) & (mu_r > 0.0)  # but for rounding
+    facet = facet._replace(mu_i=dr.select(valid, facet.mu_i, 1.0), mu_r=dr.select(valid, mu_r, 1.0))
     weight = dr.select(valid, weight, 0.0)
-    values = integrand((x * inverse, y * inverse, inverse), mu_i, mu_r, geometry, args)
-    return [weight * value for value in values]
+    return [weight * value for value in integrand(facet, geometry, args)]
 
 
 def _added(*values: list[Any]) -> list[Any]:
     return [sum(x[1:], x[0]) for x in zip(*values, strict=True)]
 
 
-def _seven(integrand: Callable[..., Any], geometry: Geometry, sigma: Any, args: Any) -> list[Any]:
-    """Seven points of the whole plane in all lanes, without a loop: six of them have the same length."""
-    inverse = dr.rsqrt(dr.fma(4.0 * sigma, sigma, 1.0))
-    flat = integrand((0.0, 0.0, 1.0), geometry.cos_i, geometry.cos_r, geometry, args)
-    pairs = [
-        _pair(integrand, sigma * u, sigma * v, inverse, _SEVEN_WEIGHT, tuple(geometry), args)
-        for u, v in _SEVEN
-    ]
-    return _added([0.5 * value for value in flat], *pairs)
-
-
-def _sum_clear(integrand: Callable[..., Any], size: int, state: Any, lanes: list[Any]) -> list[Any]:
-    """Pairs of points of the whole plane; ``lanes`` of each of the rules."""
-    F = type(state[0])
-    UInt = dr.uint32_array_t(F)
-    points = _packets(F, _CLEAR)
-    start, count = UInt(0), UInt(0)
-    for mask, (first, length) in zip(lanes, _CLEAR_RANGES, strict=True):
-        start, count = dr.select(mask, UInt(first), start), dr.select(mask, UInt(length), count)
+def _sum_clear(
+    integrand: Callable[..., Any], size: int, state: Any, points: Callable[[Any], Any], start: Any, count: Any
+) -> list[Any]:
+    """Pairs of points of the whole plane."""
 
     def pair(j: Any, sigma: Any, vectors: Any, args: Any) -> list[Any]:
-        u, v, weight, _ = points(start + j)
-        u, v = sigma * u, sigma * v
-        inverse = dr.rsqrt(dr.fma(u, u, dr.fma(v, v, 1.0)))
-        return _pair(integrand, u, v, inverse, weight, vectors, args)
+        u, v, weight, length2 = points(start + j)
+        inverse = dr.rsqrt(dr.fma(length2 * sigma, sigma, 1.0))
+        v = sigma * v if dr.is_jit_v(v) or v else 0.0
+        return _pair(integrand, sigma * u, v, inverse, weight, vectors, args)
 
     return summed(pair, count, size, state, label="facets")
 
@@ -401,7 +436,7 @@ def _sum_edge(integrand: Callable[..., Any], size: int, state: Any, lanes: Any, 
         geometry = Geometry(*vectors)
         (f, e), c_near, *_ = _nearer_edge_axes(geometry, *_edges(geometry, sigma))
         below, above, weight, _ = rows.rows(rows.first + j)
-        first, count = (UInt(x) for x in rows.ranges(rows.first + j))
+        first, count = (x if isinstance(x, int) else UInt(x) for x in rows.ranges(rows.first + j))
         w, share = _between(below, above, 0.0, _tail(c_near))
         w = sigma * w
 
@@ -412,7 +447,7 @@ def _sum_edge(integrand: Callable[..., Any], size: int, state: Any, lanes: Any, 
             # e is perpendicular to (x, y)
             inverse = dr.rsqrt(dr.fma(v, v, length2))
             sides = ((dr.fma(e[0], side, x), dr.fma(e[1], side, y)) for side in (v, -v))
-            return _added(*(_facet(integrand, *slopes, inverse, weight, vectors, args) for slopes in sides))
+            return _added(*(_within(integrand, *slopes, inverse, weight, vectors, args) for slopes in sides))
 
         inner = sigma, vectors, args, ((w * f[0], w * f[1]), dr.fma(w, w, 1.0), e, weight * share)
         return summed(pair, count, size, inner, differentiated((sigma, vectors, args)), "edge pairs")
@@ -443,7 +478,7 @@ def _sum_wedge(integrand: Callable[..., Any], size: int, state: Any, lanes: Any,
                 inverse = dr.rsqrt(dr.fma(v, v, length2))
                 slopes = dr.fma(e[0], v, x), dr.fma(e[1], v, y)
                 node_weight = row_weight * weight * share
-                found.append(_facet(integrand, *slopes, inverse, node_weight, vectors, args))
+                found.append(_within(integrand, *slopes, inverse, node_weight, vectors, args))
             return _added(*found)
 
         inner = sigma, vectors, args, ((w * f[0], w * f[1]), dr.fma(w, w, 1.0), e, weight * share, ends)
@@ -475,7 +510,7 @@ def _tail(x: Any) -> Any:
     """1 − Φ(x), ends at ±9; relative error 2e-11 for x > 0 (minimax)."""
     t = dr.minimum(dr.abs(x), _REACH)
     ratio = polynomial(t, _MILLS_NUMERATOR) / polynomial(t, _MILLS_DENOMINATOR)
-    tail = (1.0 / math.sqrt(2.0 * math.pi)) * dr.exp(-0.5 * t * t) * ratio
+    tail = (1.0 / math.sqrt(2.0 * math.pi)) * exp2((-0.5 / _LN2) * t * t) * ratio
     return dr.select(x < 0.0, 1.0 - tail, tail)
 
 
@@ -515,9 +550,12 @@ def _between(below: Any, above: Any, low: Any, high: Any) -> tuple[Any, Any]:
     share = dr.maximum((1.0 - low) - high, 0.0)
     left, right = dr.fma(share, below, low), dr.fma(share, above, high)
     # x with the smaller of the two tails p, as a rational function of √(−2 log p)
-    t = dr.sqrt(-2.0 * dr.log(dr.clip(dr.minimum(left, right), 1e-18, 0.5)))
+    lower = left < right
+    p = dr.select(lower, left, right)
+    p = dr.select(p < 1e-18, 1e-18, dr.select(p > 0.5, 0.5, p))
+    t = dr.sqrt((-2.0 * _LN2) * log2(p))
     x = polynomial(t, _SLOPE_NUMERATOR) / polynomial(t, _SLOPE_DENOMINATOR)
-    return dr.select(left < right, -x, x), share
+    return dr.select(lower, -x, x), share
 
 
 def _transported_average(
@@ -531,20 +569,23 @@ def _transported_average(
     c_i, c_r = _edges(geometry, sigma)
     total: list[Any] = [0.0] * size
     cos_phi, sin_phi = -geometry.s_r[1], geometry.s_r[0]
-    across = dr.abs(sin_phi)
-    turned_cosine = dr.select(sin_phi < 0.0, -cos_phi, cos_phi)
+    mirror = dr.select(sin_phi < 0.0, -1.0, 1.0)
+    across, turned_cosine = mirror * sin_phi, mirror * cos_phi
     for row in transported_rows(c_r, c_i, -cos_phi, across):
         u = sigma * row.u
         length2 = dr.fma(u, u, 1.0)
         # one exit angle for the whole row, that of the mean square across
         mu_r = dr.fma(-u, geometry.sin_r, geometry.cos_r) * dr.rsqrt(dr.fma(sigma, sigma, length2))
         mu_r = dr.maximum(mu_r, 1e-6)
+        along = dr.fma(u, geometry.cos_r, geometry.sin_r)
         for v, weight in row.nodes:
             v = sigma * v
             x, y = dr.fma(-u, cos_phi, across * v), dr.fma(-u, sin_phi, -turned_cosine * v)
             inverse = dr.rsqrt(dr.fma(v, v, length2))
-            mu_i = dr.maximum(inverse * dr.fma(-x, geometry.sin_i, geometry.cos_i), 1e-6)
-            values = integrand((x * inverse, y * inverse, inverse), mu_i, mu_r, geometry, args)
+            q, twist = tilt_rotation(inverse * along, inverse * v)
+            facet = _facet(x, y, inverse, geometry, mu_r, (q, mirror * twist))
+            facet = facet._replace(mu_i=dr.maximum(facet.mu_i, 1e-6))
+            values = integrand(facet, geometry, args)
             total = [dr.fma(weight, value, t) for value, t in zip(values, total, strict=True)]
     return total
 

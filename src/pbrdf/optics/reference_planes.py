@@ -43,14 +43,13 @@ def facet_rotations(geometry: Geometry) -> tuple[Any, Any, Any, Any]:
     return (*double_angle(geometry.p_i, geometry.s_i), *double_angle(geometry.p_r, geometry.s_r))
 
 
-def tilt_rotation(m: Any, p: Any, s: Any) -> tuple[Any, Any]:
-    """Return sin²β cos2χ and sin²β sin2χ for a facet with normal m seen along a ray with frame (p, s).
+def tilt_rotation(along_p: Any, along_s: Any) -> tuple[Any, Any]:
+    """Return sin²β cos2χ and sin²β sin2χ for a facet whose normal has these components in a ray's frame (p, s).
 
     β is the angle between the ray and m, χ the turn from the surface's frame to the facet's. The factor
-    sin²β makes both polynomials in m, without the singularity at β = 0; the difference of the two Fresnel
+    sin²β makes both polynomials in the normal, without the singularity at β = 0; the difference of the two Fresnel
     transmittances brings that factor (see :func:`pbrdf.optics.fresnel.transmittances`).
     """
-    along_p, along_s = dot(m, p), dot(m, s)
     return along_p * along_p - along_s * along_s, 2.0 * along_p * along_s
 
 

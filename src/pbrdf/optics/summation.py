@@ -32,7 +32,8 @@ def summed(
         Returns the ``size`` floats that are summed up. What it captures rather than gets from ``state`` counts as
         constant.
     count
-        Number of terms, an integer of the lane's own.
+        Number of terms, an integer of the lane's own. Where it is a Python number there is no loop in what is compiled,
+        and ``term`` gets Python numbers: faster, where the terms are few.
     size
         Number of sums.
     state
@@ -48,6 +49,9 @@ def summed(
     list
         The ``size`` sums.
     """
+    if isinstance(count, int):
+        terms = [term(j, *state) for j in range(count)]
+        return [sum(values[1:], values[0]) for values in zip(*terms, strict=True)] if terms else [0.0] * size
     leaves = list(_leaves(state))
     kind: Any = next((type(x) for x in leaves if dr.is_jit_v(x)), float)
     UInt = dr.uint32_array_t(kind)

@@ -20,15 +20,16 @@ from pbrdf.optics.diffuse import minnaert_shape
 from pbrdf.optics.fresnel import transmittances
 from pbrdf.optics.geometry import Geometry, dot
 from pbrdf.optics.powers import polynomial
-from pbrdf.optics.quadrature import facet_average, table
-from pbrdf.optics.reference_planes import tilt_rotation
+from pbrdf.optics.quadrature import Facet, facet_average, table
 
 __all__ = [
     "NORMALIZATIONS",
     "TRANSMITTANCES",
     "average_steepness",
     "exit_and_entry_polarisation",
+    "exit_and_entry_sums",
     "exit_polarisation",
+    "exit_sums",
     "visible_means",
 ]
 
@@ -47,7 +48,7 @@ def exit_polarisation(
     normalization: str = "weighted",
     transmittance: str = "flux",
     accuracy: str = "default",
-    rule: str | None = None,
+    sums: list[Any] | None = None,
 ) -> tuple[Any, Any, Any]:
     """First column (I, Q, U) of D_v, paper eqs (12)-(13), in the surface's frame of the reflected ray.
 
@@ -61,33 +62,49 @@ def exit_polarisation(
         Reading of eq. (13) and of M_t, see the module.
     accuracy
         Accuracy of the average over the facets.
-    rule
-        How all lanes average, where that is known, see :func:`pbrdf.optics.quadrature.facet_average`.
+    sums
+        What :func:`exit_sums` gave, if it was asked before.
     """
+    if sums is None:
+        sums = exit_sums(geometry, sigma, n, kappa, k, normalization, transmittance, accuracy)
+    intensity, q, u = sums[:3]
+    if normalization == "weighted":
+        scale = _inverse(sums[3])
+    else:
+        solid_angle, integral = visible_means(geometry, k, accuracy, _unit_of_weights(geometry, sigma))
+        scale = solid_angle * _inverse(integral)
+    return intensity * scale, q * scale, u * scale
 
+
+def exit_sums(
+    geometry: Geometry,
+    sigma: Any,
+    n: Any,
+    kappa: Any | None,
+    k: Any,
+    normalization: str = "weighted",
+    transmittance: str = "flux",
+    accuracy: str = "default",
+    rule: str | None = None,
+) -> list[Any]:
+    """Averages over the facets that :func:`exit_polarisation` is made of, parameters as there.
+
+    ``rule`` says how all lanes average, where that is known, see :func:`pbrdf.optics.quadrature.facet_average`.
+    """
     unit = _unit_of_weights(geometry, sigma)
 
-    def integrand(m: Any, mu_i: Any, mu_r: Any, geometry: Geometry, args: Any) -> tuple[Any, ...]:
+    def integrand(facet: Facet, geometry: Geometry, args: Any) -> tuple[Any, ...]:
         n, kappa, k = args
-        W = minnaert_shape(mu_i, mu_r, k, unit)
-        mean, half = transmittances(mu_r, n, kappa, transmittance)
-        q, u = tilt_rotation(m, geometry.p_r, geometry.s_r)
-        half = W * half
-        values = (W * mean, half * q, half * u)
+        W = minnaert_shape(facet.mu_i, facet.mu_r, k, unit)
+        column = _transmission_vector(facet.mu_r, facet.turn_r, n, kappa, transmittance)
+        values = tuple(W * x for x in column)
         return (*values, W) if weighted else values
 
     # W only where it is used: Dr.Jit 1.5 crashes on derivatives of a loop of which an output was dropped
     weighted = normalization == "weighted"
     steepness = average_steepness(dr.detach(k), normalization)
     size = 4 if weighted else 3
-    found = facet_average(integrand, size, geometry, sigma, (n, kappa, k), accuracy, steepness, rule)
-    intensity, q, u = found[:3]
-    if weighted:
-        scale = _inverse(found[3])
-    else:
-        solid_angle, integral = visible_means(geometry, k, accuracy, unit)
-        scale = solid_angle * _inverse(integral)
-    return intensity * scale, q * scale, u * scale
+    return facet_average(integrand, size, geometry, sigma, (n, kappa, k), accuracy, steepness, rule)
 
 
 def exit_and_entry_polarisation(
@@ -97,27 +114,42 @@ def exit_and_entry_polarisation(
     kappa: Any | None,
     k: Any,
     accuracy: str = "default",
-    rule: str | None = None,
+    sums: list[Any] | None = None,
 ) -> list[list[Any]]:
     """3 x 3 block (I, Q, U) of D_b = E[W T_out D_s T_in]/E[W]: light enters and leaves through the facet.
 
     Beyond the paper (docs/model.md, section 3): with the transmittance of flux on both ways and both frame
-    rotations, Helmholtz reciprocity holds for the whole Mueller matrix.
+    rotations, Helmholtz reciprocity holds for the whole Mueller matrix. ``sums`` are those of
+    :func:`exit_and_entry_sums`, if it was asked before.
     """
+    if sums is None:
+        sums = exit_and_entry_sums(geometry, sigma, n, kappa, k, accuracy)
+    E_W, *block = sums
+    scale = _inverse(E_W)
+    return [[block[3 * i + j] * scale for j in range(3)] for i in range(3)]
 
+
+def exit_and_entry_sums(
+    geometry: Geometry,
+    sigma: Any,
+    n: Any,
+    kappa: Any | None,
+    k: Any,
+    accuracy: str = "default",
+    rule: str | None = None,
+) -> list[Any]:
+    """Averages that :func:`exit_and_entry_polarisation` is made of; ``rule`` as in :func:`exit_sums`."""
     unit = _unit_of_weights(geometry, sigma)
 
-    def integrand(m: Any, mu_i: Any, mu_r: Any, geometry: Geometry, args: Any) -> tuple[Any, ...]:
+    def integrand(facet: Facet, geometry: Geometry, args: Any) -> tuple[Any, ...]:
         n, kappa, k = args
-        W = minnaert_shape(mu_i, mu_r, k, unit)
-        column = _transmission_vector(m, mu_r, geometry.p_r, geometry.s_r, n, kappa)
-        row = _transmission_vector(m, mu_i, geometry.p_i, geometry.s_i, n, kappa)
+        W = minnaert_shape(facet.mu_i, facet.mu_r, k, unit)
+        column = _transmission_vector(facet.mu_r, facet.turn_r, n, kappa)
+        row = _transmission_vector(facet.mu_i, facet.turn_i, n, kappa)
         return (W, *(W * out * enter for out in column for enter in row))
 
     steepness = average_steepness(dr.detach(k))
-    E_W, *block = facet_average(integrand, 10, geometry, sigma, (n, kappa, k), accuracy, steepness, rule)
-    scale = _inverse(E_W)
-    return [[block[3 * i + j] * scale for j in range(3)] for i in range(3)]
+    return facet_average(integrand, 10, geometry, sigma, (n, kappa, k), accuracy, steepness, rule)
 
 
 def average_steepness(k: Any, normalization: str = "weighted") -> Any:
@@ -137,10 +169,12 @@ def _unit_of_weights(geometry: Geometry, sigma: Any) -> Any:
     return dr.rcp(dr.detach((mu_i + mu_r) * mu_i * mu_r))
 
 
-def _transmission_vector(m: Any, mu: Any, p: Any, s: Any, n: Any, kappa: Any | None) -> tuple[Any, Any, Any]:
-    """(T_+, T_− cos2χ, T_− sin2χ) of a facet for the ray with frame (p, s): first column or first row."""
-    mean, half = transmittances(mu, n, kappa, "flux")
-    q, u = tilt_rotation(m, p, s)
+def _transmission_vector(
+    mu: Any, turn: tuple[Any, Any], n: Any, kappa: Any | None, transmittance: str = "flux"
+) -> tuple[Any, Any, Any]:
+    """(T_+, T_− cos2χ, T_− sin2χ) of a facet for a ray: first column or first row."""
+    mean, half = transmittances(mu, n, kappa, transmittance)
+    q, u = turn
     return mean, half * q, half * u
 
 
