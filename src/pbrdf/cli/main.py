@@ -177,7 +177,7 @@ def _start_lightly() -> None:
     # threads of OpenBLAS that wait for work spin for a tenth of a second each, unless told (2⁴ cycles) to sleep
     os.environ.setdefault("OPENBLAS_THREAD_TIMEOUT", "4")
     # what imports make by the hundred thousand stays: no use in looking through all of it again and again
-    gc.set_threshold(200_000, 20, 50)
+    gc.set_threshold(500_000, 20, 50)
     # and none at the end in looking for what is garbage in all that goes anyway
     atexit.register(gc.freeze)
 
