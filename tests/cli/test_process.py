@@ -83,6 +83,21 @@ def test_commands_load_only_what_they_need(tmp_path, arguments, left_out):
 
 
 @pytest.mark.slow
+def test_figures_are_styled_without_matplotlibs_style_sheets():
+    code = (
+        "import sys, matplotlib, matplotlib.figure; from pbrdf.report.style import _RC, styled\n"
+        "with styled(): ours = dict(matplotlib.rcParams)\n"
+        "assert 'matplotlib.style' not in sys.modules\n"
+        "with matplotlib.rc_context():\n"
+        "    matplotlib.rcdefaults()\n"
+        "    matplotlib.rcParams.update(_RC)\n"
+        "    assert dict(matplotlib.rcParams) == ours"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.slow
 def test_a_process_ends_without_looking_through_all_that_it_holds():
     """Three full collections at the end of a command took a fifth of its time."""
     code = (

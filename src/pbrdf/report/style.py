@@ -78,9 +78,9 @@ def styled() -> Iterator[None]:
     """Matplotlib with the project's settings while a figure is built or saved, whatever the user's are."""
     import matplotlib
 
-    with matplotlib.rc_context():
-        matplotlib.rcdefaults()
-        matplotlib.rcParams.update(_RC)  # type: ignore[arg-type]
+    # matplotlib.rcdefaults would read all of matplotlib's style sheets
+    defaults = {name: value for name, value in matplotlib.rcParamsDefault.items() if name != "backend"}
+    with matplotlib.rc_context({**defaults, **_RC}):  # type: ignore[arg-type]
         yield
 
 
