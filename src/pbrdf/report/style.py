@@ -79,8 +79,8 @@ def styled() -> Iterator[None]:
     import matplotlib
 
     # matplotlib.rcdefaults would read all of matplotlib's style sheets
-    defaults = {name: value for name, value in matplotlib.rcParamsDefault.items() if name != "backend"}
-    with matplotlib.rc_context({**defaults, **_RC}):  # type: ignore[arg-type]
+    settings: dict[Any, Any] = {k: v for k, v in matplotlib.rcParamsDefault.items() if k != "backend"} | _RC
+    with matplotlib.rc_context(settings):
         yield
 
 
