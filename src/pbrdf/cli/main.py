@@ -1,43 +1,30 @@
 """The command ``pbrdf``: its subcommands, and what a user sees of an error.
 
-Nothing here imports more than typer; every command imports what it needs when it runs, so that the help
-appears at once.
+Nothing here imports more than typer; a command is loaded when it is called, and imports what it needs when it runs, so
+that the help appears at once.
 """
 
 from __future__ import annotations
 
+import atexit
 import errno
 import gc
 import os
 import sys
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from importlib import import_module
 from typing import Annotated, Any
 
 import typer
+import typer.main
 from typer.core import TyperGroup
 
-from pbrdf.cli.calibrate import calibrate
-from pbrdf.cli.check import check
 from pbrdf.cli.command_line import given_arguments, remember_arguments
-from pbrdf.cli.compare import compare
 from pbrdf.cli.console import fail, warn
-from pbrdf.cli.convert import convert
-from pbrdf.cli.doctor import doctor
-from pbrdf.cli.export import export
-from pbrdf.cli.fit import fit
 from pbrdf.cli.interrupt import INTERRUPTED, end, heard_at_once
-from pbrdf.cli.lists import models, paints
-from pbrdf.cli.measure import measure
 from pbrdf.cli.options import ReadingCommand
-from pbrdf.cli.plan import plan
-from pbrdf.cli.plot import plot
-from pbrdf.cli.polarimeter import polarimeter
-from pbrdf.cli.reduce import reduce
-from pbrdf.cli.render import render
-from pbrdf.cli.reproduce import reproduce
-from pbrdf.cli.simulate import simulate
 from pbrdf.cli.values import refuse_odd_numbers
 from pbrdf.errors import PbrdfError, PluginWarning
 from pbrdf.version import __version__
@@ -46,10 +33,60 @@ __all__ = ["app", "main"]
 
 #: Exit code where the input, and not the program, is at fault; the same as for a wrong option.
 USER_ERROR = 2
+#: The commands in the order of the help, with the module of ``pbrdf.cli`` that has a function of the same name.
+COMMANDS = {
+    "fit": "fit",
+    "compare": "compare",
+    "simulate": "simulate",
+    "calibrate": "calibrate",
+    "polarimeter": "polarimeter",
+    "reduce": "reduce",
+    "plot": "plot",
+    "plan": "plan",
+    "measure": "measure",
+    "render": "render",
+    "reproduce": "reproduce",
+    "export": "export",
+    "check": "check",
+    "convert": "convert",
+    "paints": "lists",
+    "models": "lists",
+    "doctor": "doctor",
+}
+
+
+class _WhenCalled(Mapping[str, Any]):
+    """The commands by name, each loaded when it is asked for: to read all their options takes as long as a fit."""
+
+    def __init__(self) -> None:
+        self._loaded: dict[str, Any] = {}
+
+    def __getitem__(self, name: str) -> Any:
+        if name not in self._loaded:
+            function = getattr(import_module(f"pbrdf.cli.{COMMANDS[name]}"), name)
+            alone = typer.Typer(
+                add_completion=False, rich_markup_mode="markdown", pretty_exceptions_enable=False
+            )
+            alone.command(name, cls=ReadingCommand)(function)
+            self._loaded[name] = typer.main.get_command(alone)
+        return self._loaded[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in COMMANDS
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(COMMANDS)
+
+    def __len__(self) -> int:
+        return len(COMMANDS)
 
 
 class _Commands(TyperGroup):
     """The group of all commands; turns errors that a user can mend into one line and exit code 2."""
+
+    def __init__(self, **attributes: Any) -> None:
+        super().__init__(**attributes)
+        self.commands = _WhenCalled()  # type: ignore[assignment]
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         remember_arguments(args)
@@ -135,31 +172,14 @@ def options(
     _register(model)
 
 
-app.command(cls=ReadingCommand)(fit)
-app.command(cls=ReadingCommand)(compare)
-app.command()(simulate)
-app.command()(calibrate)
-app.command()(polarimeter)
-app.command()(reduce)
-app.command(cls=ReadingCommand)(plot)
-app.command()(plan)
-app.command()(measure)
-app.command()(render)
-app.command()(reproduce)
-app.command()(export)
-app.command(cls=ReadingCommand)(check)
-app.command(cls=ReadingCommand)(convert)
-app.command()(paints)
-app.command()(models)
-app.command()(doctor)
-
-
 def _start_lightly() -> None:
-    """Leave out work at the start of a process that takes as long as a command's own."""
+    """Leave out work at the start and at the end of a process that takes as long as a command's own."""
     # threads of OpenBLAS that wait for work spin for a tenth of a second each, unless told (2⁴ cycles) to sleep
     os.environ.setdefault("OPENBLAS_THREAD_TIMEOUT", "4")
     # what imports make by the hundred thousand stays: no use in looking through all of it again and again
-    gc.set_threshold(50_000, 20, 50)
+    gc.set_threshold(500_000, 20, 50)
+    # and none at the end in looking for what is garbage in all that goes anyway
+    atexit.register(gc.freeze)
 
 
 def main() -> None:

@@ -259,7 +259,7 @@ _READING: dict[str, tuple[Any, Any]] = {
 
 
 class ReadingCommand(TyperCommand):
-    """A command with the options of :class:`Reading`; its help names the formats that are known when it is shown."""
+    """A command whose help names the formats that are known when it is shown, should it speak of them."""
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
         from pbrdf.data.readers import format_names, written_extensions

@@ -78,9 +78,9 @@ def styled() -> Iterator[None]:
     """Matplotlib with the project's settings while a figure is built or saved, whatever the user's are."""
     import matplotlib
 
-    with matplotlib.rc_context():
-        matplotlib.rcdefaults()
-        matplotlib.rcParams.update(_RC)  # type: ignore[arg-type]
+    # matplotlib.rcdefaults would read all of matplotlib's style sheets
+    settings: dict[Any, Any] = {k: v for k, v in matplotlib.rcParamsDefault.items() if k != "backend"} | _RC
+    with matplotlib.rc_context(settings):
         yield
 
 

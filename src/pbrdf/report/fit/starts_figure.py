@@ -67,6 +67,8 @@ def starts_figure(report: Report) -> Figure:
             ax.set_ylim(estimate.lower, estimate.upper)
             ax.set_xticks([0, 1], ["start", "end"])
             ax.set_xlim(-0.12, 1.12)
+            for axis in (ax.xaxis, ax.yaxis):
+                axis.set_label_coords(0.5, 0.0)  # it has no label: no search for its place
         for ax in axes.ravel()[len(free) :]:
             ax.remove()
         return figure
