@@ -24,7 +24,7 @@ from pbrdf.optics.facet_reflection import facet_reflection, tan2_tilt
 from pbrdf.optics.facets import projected_area_density
 from pbrdf.optics.fresnel import mueller_reflection
 from pbrdf.optics.geometry import Geometry
-from pbrdf.optics.quadrature import ACCURACIES, RULES, choose_rule, wedge_distance
+from pbrdf.optics.quadrature import ACCURACIES, PACKET_RULE, RULES, choose_rule, wedge_distance
 from pbrdf.optics.shadowing import SHADOWING
 from pbrdf.optics.transmission import (
     NORMALIZATIONS,
@@ -95,6 +95,8 @@ _ACCURACY = Option(
 _FEW = 1 << 16
 #: Up to this slope standard deviation a renderer averages over the facets with accuracy ``fast``.
 FAST_SIGMA = 0.06
+#: Up to this one by the rule for packets of rays.
+PACKET_SIGMA = 0.12
 #: Bounds of a fit for normalization="visible", whose average diverges for k ≤ 1/3.
 _VISIBLE_K = 0.35
 #: cosθ of the direction of view at which the diffuse albedo is estimated: the mean of cosθ over cosθ dω.
@@ -134,9 +136,12 @@ class _GaussianFacets(Model):
     facet_rule: str | None = None
 
     def for_rendering(self) -> Self:
-        """``fast`` where that is exact enough."""
-        smooth = np.max(self.lobe_width()) <= FAST_SIGMA
-        return self.with_accuracy("fast" if smooth else "default")
+        """``fast`` where that is exact enough; else ``default``, by the rule for packets of rays where that is."""
+        widest = np.max(self.lobe_width())
+        if widest <= FAST_SIGMA:
+            return self.with_accuracy("fast")
+        model = self.with_accuracy("default")
+        return model._with_rule(PACKET_RULE) if widest <= PACKET_SIGMA else model
 
     def lane_groups(
         self, scalars: Mapping[str, Any], floats: Mapping[str, Any], size: int, part: str
@@ -158,20 +163,20 @@ class _GaussianFacets(Model):
         first = rule(low[0], low[1], low[2], min(max(1.0, k[0]), k[1]))
         last = rule(high[0], high[1], high[2], max(k, key=lambda x: abs(x - 1.0)))
         if first == last:
-            return [(self._with_rule(first), None)]
+            return [(self._with_rule(RULES[first]), None)]
         if size < _FEW:
             return [(self, None)]
         found = rule(floats["theta_i"], floats["theta_r"], floats["sigma"], floats["k"])
         dr.eval(found)
         groups: list[tuple[Self, Any]] = [
-            (self._with_rule(j), dr.compress(found == j)) for j in range(first, last + 1)
+            (self._with_rule(RULES[j]), dr.compress(found == j)) for j in range(first, last + 1)
         ]
         return [(model, lanes) for model, lanes in groups if dr.width(lanes) > 0]
 
-    def _with_rule(self, index: int) -> Self:
+    def _with_rule(self, rule: str) -> Self:
         """The same model for directions that all take one rule."""
         other = copy(self)
-        object.__setattr__(other, "facet_rule", RULES[index])
+        object.__setattr__(other, "facet_rule", rule)
         return other
 
     def lobe_width(self, values: Mapping[str, Any] | None = None) -> Any:

@@ -10,7 +10,7 @@ from typing import Any
 
 import drjit as dr
 
-__all__ = ["polynomial", "power"]
+__all__ = ["is_single", "log2", "polynomial", "power"]
 
 #: log2(1 + f)/f for |f| ≤ 1/3, absolute error of f times it 3e-7 (minimax).
 _LOG2 = (1.44269359, -0.721402698, 0.481066781, -0.357728874, 0.283652863, -0.284250975, 0.257091115)
@@ -23,19 +23,39 @@ _ROUNDING = 1.5 * 2.0**23
 
 def power(base: Any, exponent: Any) -> Any:
     """base^exponent for a base > 0; in single precision below 2^127."""
-    if not _is_single(base) or dr.grad_enabled(base) or dr.grad_enabled(exponent):
+    if not is_single(base) or dr.grad_enabled(base) or dr.grad_enabled(exponent):
         return dr.exp(exponent * dr.log(base))
     F, Int = type(base), dr.int32_array_t(type(base))
-    bits: Any = dr.reinterpret_array(Int, base)
-    octave = (bits - _TWO_THIRDS) >> _MANTISSA
-    mantissa: Any = dr.reinterpret_array(F, bits - (octave << _MANTISSA))
-    f = mantissa - 1.0
-    y: Any = dr.maximum(exponent * dr.fma(f, polynomial(f, _LOG2), F(octave)), -126.0)
+    y: Any = dr.maximum(exponent * log2(base), -126.0)
     # adding 1.5·2²³ rounds to a whole number, which then stands in the lowest bits
     shifted = y + _ROUNDING
     whole: Any = dr.reinterpret_array(Int, shifted)
     scale: Any = dr.reinterpret_array(F, (whole + 127) << _MANTISSA)
     return polynomial(y - (shifted - _ROUNDING), _EXP2) * scale
+
+
+def log2(x: Any) -> Any:
+    """Logarithm to base 2 of x > 0; in single precision with an absolute error of 3e-7."""
+    if not is_single(x) or dr.grad_enabled(x):
+        return dr.log2(x)
+    F, Int = type(x), dr.int32_array_t(type(x))
+    bits: Any = dr.reinterpret_array(Int, x)
+    octave = (bits - _TWO_THIRDS) >> _MANTISSA
+    mantissa: Any = dr.reinterpret_array(F, bits - (octave << _MANTISSA))
+    f = mantissa - 1.0
+    return dr.fma(f, polynomial(f, _LOG2), F(octave))
+
+
+def log2(x: Any) -> Any:
+    """Logarithm to base 2 of x > 0; in single precision with an absolute error of 3e-7."""
+    if not is_single(x) or dr.grad_enabled(x):
+        return dr.log2(x)
+    F, Int = type(x), dr.int32_array_t(type(x))
+    bits: Any = dr.reinterpret_array(Int, x)
+    octave = (bits - _TWO_THIRDS) >> _MANTISSA
+    mantissa: Any = dr.reinterpret_array(F, bits - (octave << _MANTISSA))
+    f = mantissa - 1.0
+    return dr.fma(f, polynomial(f, _LOG2), F(octave))
 
 
 def polynomial(x: Any, coefficients: tuple[Any, ...]) -> Any:
@@ -46,5 +66,6 @@ def polynomial(x: Any, coefficients: tuple[Any, ...]) -> Any:
     return total
 
 
-def _is_single(x: Any) -> bool:
+def is_single(x: Any) -> bool:
+    """Whether x is an array of float32."""
     return dr.is_jit_v(x) and dr.type_v(x) == dr.VarType.Float32
