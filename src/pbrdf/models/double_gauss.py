@@ -148,7 +148,7 @@ class _GaussianFacets(Model):
     ) -> Sequence[tuple[Self, Any]]:
         """Directions by the rule of the average over the facets."""
         accuracy = self.chosen["accuracy"]
-        if part == "specular" or accuracy == "fast":
+        if part == "specular" or accuracy == "fast" or self.facet_rule is not None:
             return [(self, None)]
         normalization = self.chosen.get("normalization", "weighted")
 

@@ -22,28 +22,16 @@ _ROUNDING = 1.5 * 2.0**23
 
 
 def power(base: Any, exponent: Any) -> Any:
-    """base^exponent for a base > 0; in single precision below 2^127."""
+    """base^exponent for a base > 0; in single precision within 2^−126 … 2^127."""
     if not is_single(base) or dr.grad_enabled(base) or dr.grad_enabled(exponent):
         return dr.exp(exponent * dr.log(base))
     F, Int = type(base), dr.int32_array_t(type(base))
-    y: Any = dr.maximum(exponent * log2(base), -126.0)
+    y: Any = dr.clip(exponent * log2(base), -126.0, 127.0)
     # adding 1.5·2²³ rounds to a whole number, which then stands in the lowest bits
     shifted = y + _ROUNDING
     whole: Any = dr.reinterpret_array(Int, shifted)
     scale: Any = dr.reinterpret_array(F, (whole + 127) << _MANTISSA)
     return polynomial(y - (shifted - _ROUNDING), _EXP2) * scale
-
-
-def log2(x: Any) -> Any:
-    """Logarithm to base 2 of x > 0; in single precision with an absolute error of 3e-7."""
-    if not is_single(x) or dr.grad_enabled(x):
-        return dr.log2(x)
-    F, Int = type(x), dr.int32_array_t(type(x))
-    bits: Any = dr.reinterpret_array(Int, x)
-    octave = (bits - _TWO_THIRDS) >> _MANTISSA
-    mantissa: Any = dr.reinterpret_array(F, bits - (octave << _MANTISSA))
-    f = mantissa - 1.0
-    return dr.fma(f, polynomial(f, _LOG2), F(octave))
 
 
 def log2(x: Any) -> Any:

@@ -95,9 +95,9 @@ ACCURACIES: dict[str, _Accuracy | None] = {
 RULES = ("seven", "twelve", "many", "one_edge", "both_edges")
 #: A rule for packets of rays in place of choosing one of ``RULES``.
 PACKET_RULE = "packet"
-#: Its rows along the nearer edge, for all lanes where the farther edge is beyond ``_PACKET_FAR``: z, upright and turned
-#: over as below and above, and weights; and two pairs ±v in each row, with the weight of each point. Both were fitted to
-#: averages of the body's light with σ ≤ 0.12 and 0.7 ≤ k ≤ 4 at any distance of the edge.
+#: Its rows along the nearer edge, where the farther one is beyond ``_PACKET_FAR``: z, positive towards the edge, and
+#: weights; two pairs ±v in each row with the weight of each point. Both were fitted to averages of body light, σ ≤ 0.12
+#: and 0.7 ≤ k ≤ 4, with the edge at any distance.
 _PACKET_ROWS = (
     (-3.5877, 0.000922),
     (-2.3485, 0.029788),
@@ -108,10 +108,11 @@ _PACKET_ROWS = (
     (3.3951, 0.001671),
 )
 _PACKET_PAIRS = ((0.7418, 0.454151), (2.3358, 0.045849))
-_PACKET_FAR = 4.5
-#: Between both edges it takes these fewer nodes where the farther edge is beyond this distance, else those of ``default``.
+_PACKET_FAR = 4.3
+#: Elsewhere it takes rows between both edges: these where the farther edge is beyond ``_PACKET_COARSE``, else those of
+#: ``default``.
 _PACKET_ACCURACY = _Accuracy(1.1, 4, (0, 0, 0, 0, 0), (0.0, 0.0, 0.0), _PACKET_FAR, 0.12, 0.0)
-_PACKET_COARSE = 2.68
+_PACKET_COARSE = 2.0
 #: For 7 and for 12 points: distance over √σ, and steepness times σ^{3/2} over distance, that are just exact enough.
 CARE = ((28.0, 0.003), (18.5, 0.01))
 
