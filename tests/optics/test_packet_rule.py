@@ -1,4 +1,4 @@
-"""The rule for packets of rays, from few nodes about the errors of ``default``, for 0.06 < σ ≤ 0.12 as in the plugin."""
+"""The rule for packets of rays: about the errors of ``default``, for 0.06 < σ ≤ 0.12 as in the plugin."""
 
 from __future__ import annotations
 
