@@ -46,6 +46,20 @@ def test_single_precision_at_the_ends(single):
     assert np.isfinite(tiny).all() and np.all(tiny >= 0.0) and np.all(tiny[x < 1e-3] < 2e-38)
 
 
+def test_single_precision_saturates(single):
+    """What is too large for single precision stays large and positive."""
+    found = power(single([1e5, 1e30]), single(19.0)).numpy()
+    assert np.all(found > 1e38) and np.isfinite(found).all()
+
+
+def test_logarithm(single, jit):
+    """Absolute error 4e-7 and rounding in single precision; 2e-15 in double."""
+    x, _ = cases(10_000)
+    exact = np.log2(x.astype(float))
+    assert np.max(np.abs(log2(single(x)).numpy() - exact) / (1.0 + np.abs(exact))) < 4e-7
+    np.testing.assert_allclose(log2(jit(x.astype(float))).numpy(), exact, rtol=1e-14, atol=1e-14)
+
+
 def test_double_precision_and_numbers(jit):
     x, y = (v.astype(float) for v in cases(1000))
     np.testing.assert_allclose(power(jit(x), jit(y)).numpy(), x**y, rtol=1e-12)

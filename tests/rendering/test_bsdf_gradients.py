@@ -14,10 +14,13 @@ PAINT = {"sigma": 0.1, "n": 1.62, "kappa": 0.4, "a": 0.9, "k": 1.25, "b": 0.3, "
 
 
 @pytest.mark.parametrize("mode", ["forward", "backward"])
-@pytest.mark.parametrize("accuracy", ["fast", "default"])
+@pytest.mark.parametrize("accuracy", ["fast", "default", None])
 @pytest.mark.parametrize("name", PAINT)
 def test_derivative_of_a_value(name, accuracy, mode):
-    """Against central differences of ``mueller()`` in double precision, summed with random weights."""
+    """Against central differences of ``mueller()`` in double precision, summed with random weights.
+
+    Without an accuracy the plugin takes the rule for packets of rays.
+    """
     mi = use("llvm_ad_mono_polarized")
     import drjit as dr
     from bsdf_helpers import implicit_axes
@@ -34,13 +37,14 @@ def test_derivative_of_a_value(name, accuracy, mode):
         return rotation(wi) @ D @ M @ D @ np.swapaxes(rotation(-wo), -1, -2) * wo[:, 2, None, None]
 
     def weighed(value):
-        model = pbrdf.DoubleGauss(**{**PAINT, name: value}, accuracy=accuracy)
+        model = pbrdf.DoubleGauss(**{**PAINT, name: value}, accuracy=accuracy or "default")
         return np.sum(weights * in_implicit_frames(model.mueller(*light(wi, wo))).mean(0))
 
     step = 1e-4 * PAINT[name]
     expected = (weighed(PAINT[name] + step) - weighed(PAINT[name] - step)) / (2.0 * step)
 
-    bsdf = mi.load_dict({"type": "pbrdf", **PAINT, "accuracy": accuracy})
+    chosen = {} if accuracy is None else {"accuracy": accuracy}
+    bsdf = mi.load_dict({"type": "pbrdf", **PAINT, **chosen})
     parameters = mi.traverse(bsdf)
     x = mi.Float(PAINT[name])
     dr.enable_grad(x)

@@ -26,7 +26,7 @@ from pbrdf.optics.facet_reflection import facet_reflection, tan2_tilt
 from pbrdf.optics.facets import projected_area_density
 from pbrdf.optics.fresnel import mueller_reflection
 from pbrdf.optics.geometry import Geometry, geometry_from_angles
-from pbrdf.optics.quadrature import ACCURACIES, RULES, choose_rule, wedge_distance
+from pbrdf.optics.quadrature import ACCURACIES, PACKET_RULE, RULES, choose_rule, wedge_distance
 from pbrdf.optics.shadowing import SHADOWING
 from pbrdf.optics.transmission import (
     NORMALIZATIONS,
@@ -99,6 +99,8 @@ _ACCURACY = Option(
 _FEW = 1 << 16
 #: Up to this slope standard deviation a renderer averages over the facets with accuracy ``fast``.
 FAST_SIGMA = 0.06
+#: Up to this one by the rule for packets of rays.
+PACKET_SIGMA = 0.12
 #: Bounds of a fit for normalization="visible", whose average diverges for k ≤ 1/3.
 _VISIBLE_K = 0.35
 #: cosθ of the direction of view at which the diffuse albedo is estimated: the mean of cosθ over cosθ dω.
@@ -140,16 +142,19 @@ class _GaussianFacets(Model):
     facet_sums: tuple[list[Any], Any] | None = None
 
     def for_rendering(self) -> Self:
-        """``fast`` where that is exact enough."""
-        smooth = np.max(self.lobe_width()) <= FAST_SIGMA
-        return self.with_accuracy("fast" if smooth else "default")
+        """``fast`` where that is exact enough; else ``default``, by the rule for packets of rays where that is."""
+        widest = np.max(self.lobe_width())
+        if widest <= FAST_SIGMA:
+            return self.with_accuracy("fast")
+        model = self.with_accuracy("default")
+        return model._with_rule(PACKET_RULE) if widest <= PACKET_SIGMA else model
 
     def lane_groups(
         self, scalars: Mapping[str, Any], floats: Mapping[str, Any], size: int, part: str
     ) -> Sequence[tuple[Self, Any]]:
         """All directions together, once the averages over the facets are found: the directions by their rule."""
         accuracy = self.chosen["accuracy"]
-        if part == "specular" or accuracy == "fast":
+        if part == "specular" or accuracy == "fast" or self.facet_rule is not None:
             return [(self, None)]
         normalization = self.chosen.get("normalization", "weighted")
 
@@ -165,7 +170,7 @@ class _GaussianFacets(Model):
         first = rule(low[0], low[1], low[2], min(max(1.0, k[0]), k[1]))
         last = rule(high[0], high[1], high[2], max(k, key=lambda x: abs(x - 1.0)))
         if first == last:
-            return [(self._with_rule(first), None)]
+            return [(self._with_rule(RULES[first]), None)]
         if size < _FEW:
             return [(self, None)]
         found = rule(floats["theta_i"], floats["theta_r"], floats["sigma"], floats["k"])
@@ -206,10 +211,10 @@ class _GaussianFacets(Model):
             dr.eval(found, place)
             start += dr.width(lanes)
         if found is None:
-            return self._with_rule(0)
+            return self._with_rule(RULES[0])
         own = place == 0
         packet: Any = dr.gather(Packet, found, dr.select(own, 0, place - 1), shape=(width, size))
-        other = self._with_rule(0)
+        other = self._with_rule(RULES[0])
         object.__setattr__(other, "facet_sums", (list(packet), own if total < size else None))
         return other
 
@@ -227,10 +232,10 @@ class _GaussianFacets(Model):
         here = self._averages(geometry, values, self.facet_rule)
         return [dr.select(own, a, b) for a, b in zip(here, sums, strict=True)]
 
-    def _with_rule(self, index: int) -> Self:
+    def _with_rule(self, rule: str) -> Self:
         """The same model for directions that all take one rule."""
         other = copy(self)
-        object.__setattr__(other, "facet_rule", RULES[index])
+        object.__setattr__(other, "facet_rule", rule)
         return other
 
     def lobe_width(self, values: Mapping[str, Any] | None = None) -> Any:

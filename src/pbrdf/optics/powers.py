@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import drjit as dr
 
-__all__ = ["exp2", "log2", "polynomial", "power"]
+__all__ = ["exp2", "is_single", "log2", "polynomial", "power"]
 
 #: log2(1 + f)/f for |f| ≤ 1/3, absolute error of f times it 3e-7 (minimax).
 _LOG2 = (1.44269359, -0.721402698, 0.481066781, -0.357728874, 0.283652863, -0.284250975, 0.257091115)
@@ -118,3 +118,8 @@ def polynomial(x: Any, coefficients: tuple[Any, ...]) -> Any:
 
 def _format(x: Any) -> tuple[Any, _Format]:
     return type(x), _SINGLE if dr.type_v(x) == dr.VarType.Float32 else _DOUBLE
+
+
+def is_single(x: Any) -> bool:
+    """Whether x is an array of float32."""
+    return dr.is_jit_v(x) and dr.type_v(x) == dr.VarType.Float32

@@ -18,7 +18,9 @@ A variable that an edge cuts off is mapped onto a normal one, x = Φ⁻¹[Φ(low
 summed over by the trapezoidal rule, which converges exponentially for analytic integrands, with algebraic
 singularities at the edges included: there 1 − Φ(z) falls off as a Gaussian. Well inside, the map is the identity.
 
-The rule is chosen for each lane of the computation apart.
+The rule is chosen for each lane of the computation apart. In a renderer's packets of rays every lane waits for all
+others, so the ``packet`` rule, for σ ≤ 0.12, has as few kinds of lanes as possible: seven rows of four points along the
+nearer edge, and rows between both where the farther edge cuts in.
 """
 
 from __future__ import annotations
@@ -32,12 +34,22 @@ import drjit as dr
 import numpy as np
 
 from pbrdf.optics.geometry import Geometry, Vector
-from pbrdf.optics.powers import exp2, log2, polynomial
+from pbrdf.optics.powers import exp2, is_single, log2, polynomial
 from pbrdf.optics.reference_planes import tilt_rotation
 from pbrdf.optics.summation import differentiated, summed
 from pbrdf.optics.transport import transported_rows
 
-__all__ = ["ACCURACIES", "CARE", "RULES", "Facet", "choose_rule", "facet_average", "table", "wedge_distance"]
+__all__ = [
+    "ACCURACIES",
+    "CARE",
+    "PACKET_RULE",
+    "RULES",
+    "Facet",
+    "choose_rule",
+    "facet_average",
+    "table",
+    "wedge_distance",
+]
 
 _LN2 = math.log(2.0)
 #: Edges beyond this many standard deviations count as this far.
@@ -104,6 +116,26 @@ ACCURACIES: dict[str, _Accuracy | None] = {
 }
 #: Cubatures of the whole plane of 7, 12 and 26 points, rows along the nearer edge, rows between both.
 RULES = ("seven", "twelve", "many", "one_edge", "both_edges")
+#: A rule for packets of rays in place of choosing one of ``RULES``.
+PACKET_RULE = "packet"
+#: Its rows along the nearer edge, where the farther one is beyond ``_PACKET_FAR``: z, positive towards the edge, and
+#: weights; two pairs ±v in each row with the weight of each point. Both were fitted to averages of body light, σ ≤ 0.12
+#: and 0.7 ≤ k ≤ 4, with the edge at any distance.
+_PACKET_ROWS = (
+    (-3.5877, 0.000922),
+    (-2.3485, 0.029788),
+    (-1.1615, 0.241352),
+    (0.0088, 0.458168),
+    (1.132, 0.231013),
+    (2.2214, 0.037086),
+    (3.3951, 0.001671),
+)
+_PACKET_PAIRS = ((0.7418, 0.454151), (2.3358, 0.045849))
+_PACKET_FAR = 4.3
+#: Elsewhere it takes rows between both edges: these where the farther edge is beyond ``_PACKET_COARSE``, else those of
+#: ``default``.
+_PACKET_ACCURACY = _Accuracy(1.1, 4, (0, 0, 0, 0, 0), (0.0, 0.0, 0.0), _PACKET_FAR, 0.12, 0.0)
+_PACKET_COARSE = 2.0
 #: For 7 and for 12 points: distance over √σ, and steepness times σ^{3/2} over distance, that are just exact enough.
 CARE = ((28.0, 0.003), (18.5, 0.01))
 
@@ -175,7 +207,7 @@ class _Tables(NamedTuple):
 def _row_rules() -> _Tables:
     tables = _Tables({}, [], [], [], [])
     first: dict[int, int] = {}
-    for name, rule in ACCURACIES.items():
+    for name, rule in (*ACCURACIES.items(), (PACKET_RULE, _PACKET_ACCURACY)):
         if rule is None:
             continue
         tables.ranges_of[name] = len(tables.rows), 2 * rule.half + 1, len(tables.columns)
@@ -195,12 +227,17 @@ def _row_rules() -> _Tables:
     return tables
 
 
+def _phi(z: float) -> float:
+    """Φ(z)."""
+    return 0.5 * math.erfc(-z / math.sqrt(2.0))
+
+
 def _trapezoid(step: float, count: int) -> list[tuple[float, float, float]]:
     """Φ(z), 1 − Φ(z) and weights of equidistant points about 0 for the normal density."""
     z = [(j - 0.5 * (count - 1)) * step for j in range(count)]
     weights = [math.exp(-0.5 * x * x) for x in z]
     total = math.fsum(weights)
-    below, above = ([0.5 * math.erfc(sign * x / math.sqrt(2.0)) for x in z] for sign in (-1.0, 1.0))
+    below, above = ([_phi(sign * x) for x in z] for sign in (1.0, -1.0))
     return [(a, b, w / total) for a, b, w in zip(below, above, weights, strict=True)]
 
 
@@ -304,7 +341,8 @@ def facet_average(
         Size of the exponent of the local cosines' product with which the integrand goes, |k − 1|: where it is small,
         fewer nodes do. For the ratio of two such integrals; each of them by itself needs six times that.
     rule
-        The one of ``RULES`` that all lanes take, where it is known: what is compiled is shorter then.
+        The one of ``RULES`` that all lanes take, where it is known: what is compiled is shorter then. Or
+        ``PACKET_RULE``, for σ ≤ 0.12, with about the errors of ``default`` whatever the accuracy.
 
     Returns
     -------
@@ -315,6 +353,8 @@ def facet_average(
     UInt = dr.uint32_array_t(F)
     if accuracy == "fast":
         return _transported_average(integrand, size, geometry, sigma, args)
+    if rule == PACKET_RULE:
+        return _packet_average(integrand, size, geometry, sigma, args)
     state = sigma, tuple(geometry), args
     if rule in RULES[:3]:
         return _sum_clear(integrand, size, state, _CLEAR.__getitem__, *_CLEAR_RANGES[RULES.index(rule)])
@@ -364,7 +404,7 @@ def _pair(
     x, y = -u * cos_phi, -u * sin_phi
     sides = []
     # both are one where v is the number 0
-    for turn, side in ((twist, v), (-twist, -v))[: 2 if dr.is_jit_v(v) else 1]:
+    for turn, side in ((twist, v), (-twist, -v))[: 2 if dr.is_jit_v(v) or v else 1]:
         slopes = dr.fma(side, sin_phi, x), dr.fma(-side, cos_phi, y)
         sides.append(integrand(_facet(*slopes, inverse, geometry, mu_r, (q, turn)), geometry, args))
     return [weight * (a + b) for a, b in zip(sides[0], sides[-1], strict=True)]
@@ -424,7 +464,7 @@ class _Rows(NamedTuple):
     pairs: Callable[[Any], Any]
 
 
-# The edges and axes are found anew in each row: other lanes never enter there, and their derivatives are those by what
+# Where there are derivatives, the edges and axes are found anew in each row: their derivatives are then those by what
 # they depend on.
 
 
@@ -459,9 +499,14 @@ def _sum_wedge(integrand: Callable[..., Any], size: int, state: Any, lanes: Any,
     """Rows between both edges."""
     UInt = type(rows.count)
 
-    def row(j: Any, sigma: Any, vectors: Any, args: Any) -> list[Any]:
+    def axes(sigma: Any, vectors: Any) -> tuple[Any, ...]:
         geometry = Geometry(*vectors)
-        f, e, beyond, lower, upper = _wedge_axes(geometry, *_edges(geometry, sigma))
+        return _wedge_axes(geometry, *_edges(geometry, sigma))
+
+    known = None if differentiated(state) else axes(*state[:2])
+
+    def row(j: Any, sigma: Any, vectors: Any, args: Any) -> list[Any]:
+        f, e, beyond, lower, upper = known or axes(sigma, vectors)
         below, above, weight, reach = rows.rows(rows.first + j)
         count = UInt(reach)
         w, share = _between(below, above, 0.0, beyond)
@@ -485,6 +530,48 @@ def _sum_wedge(integrand: Callable[..., Any], size: int, state: Any, lanes: Any,
         return summed(pair, count, size, inner, differentiated((sigma, vectors, args)), "wedge columns")
 
     return summed(row, dr.select(lanes, rows.count, UInt(0)), size, state, label="wedge rows")
+
+
+def _packet_average(
+    integrand: Callable[..., Any], size: int, geometry: Geometry, sigma: Any, args: Any
+) -> list[Any]:
+    """The rule ``packet``: as many rows along the nearer edge in nearly all lanes, between both edges in the others."""
+    F = type(sigma)
+    UInt = dr.uint32_array_t(F)
+    state = sigma, tuple(geometry), args
+    edge_rows = _packets(F, [(_phi(z), _phi(-z), weight, 0.0) for z, weight in _PACKET_ROWS])
+
+    def axes(sigma: Any, vectors: Any) -> tuple[Any, ...]:
+        geometry = Geometry(*vectors)
+        (f, e), c_near, *_ = _nearer_edge_axes(geometry, *_edges(geometry, sigma))
+        return f, e, _tail(c_near)
+
+    known = None if differentiated(state) else axes(*state[:2])
+
+    def row(j: Any, sigma: Any, vectors: Any, args: Any) -> list[Any]:
+        geometry = Geometry(*vectors)
+        f, e, beyond = known or axes(sigma, vectors)
+        below, above, row_weight, _ = edge_rows(j)
+        w, share = _between(below, above, 0.0, beyond)
+        w, row_weight = sigma * w, share * row_weight
+        x, y, length2 = w * f[0], w * f[1], dr.fma(w, w, 1.0)
+        found = []
+        for v, weight in _PACKET_PAIRS:
+            v = sigma * v
+            inverse = dr.rsqrt(dr.fma(v, v, length2))
+            for side in (v, -v):
+                slopes = dr.fma(e[0], side, x), dr.fma(e[1], side, y)
+                found.append(_within(integrand, *slopes, inverse, row_weight * weight, geometry, args))
+        return _added(*found)
+
+    c_far = dr.maximum(*_edges(geometry, sigma))
+    one_edge = c_far > _PACKET_FAR
+    count = dr.select(one_edge, UInt(len(_PACKET_ROWS)), UInt(0))
+    along = summed(row, count, size, state, label="packet rows")
+    ranges = zip(_TABLES.ranges_of[PACKET_RULE], _TABLES.ranges_of["default"], strict=True)
+    level = (dr.select(c_far > _PACKET_COARSE, UInt(few), UInt(many)) for few, many in ranges)
+    rows = _Rows(*level, *(_packets(F, numbers) for numbers in _TABLES[1:]))
+    return _added(along, _sum_wedge(integrand, size, state, ~one_edge, rows))
 
 
 _MILLS_NUMERATOR = (
@@ -531,6 +618,10 @@ _SLOPE_DENOMINATOR = (
     6.82996118313344e-06,
 )
 
+#: The same in single precision: absolute error 6e-6 within ±6 (minimax).
+_SINGLE_NUMERATOR = (-2.85858608, -2.0104773, 2.65279296, 0.9485245)
+_SINGLE_DENOMINATOR = (1.0, 2.74584828, 0.9462086)
+
 
 def _between(below: Any, above: Any, low: Any, high: Any) -> tuple[Any, Any]:
     """Map a normal variable z onto one between two bounds.
@@ -545,16 +636,22 @@ def _between(below: Any, above: Any, low: Any, high: Any) -> tuple[Any, Any]:
     Returns
     -------
     x, share
-        Point between the bounds, absolute error 4e-10 (minimax) within ±9; probability between the bounds.
+        Point between the bounds, absolute error 4e-10 (minimax) within ±9, in single precision without derivatives 6e-6
+        within ±6; probability between the bounds.
     """
     share = dr.maximum((1.0 - low) - high, 0.0)
     left, right = dr.fma(share, below, low), dr.fma(share, above, high)
     # x with the smaller of the two tails p, as a rational function of √(−2 log p)
     lower = left < right
     p = dr.select(lower, left, right)
-    p = dr.select(p < 1e-18, 1e-18, dr.select(p > 0.5, 0.5, p))
+    single = is_single(p) and not dr.grad_enabled(p)
+    least = 1e-9 if single else 1e-18
+    p = dr.select(p < least, least, dr.select(p > 0.5, 0.5, p))
     t = dr.sqrt((-2.0 * _LN2) * log2(p))
-    x = polynomial(t, _SLOPE_NUMERATOR) / polynomial(t, _SLOPE_DENOMINATOR)
+    if single:
+        x = polynomial(t, _SINGLE_NUMERATOR) / polynomial(t, _SINGLE_DENOMINATOR)
+    else:
+        x = polynomial(t, _SLOPE_NUMERATOR) / polynomial(t, _SLOPE_DENOMINATOR)
     return dr.select(lower, -x, x), share
 
 

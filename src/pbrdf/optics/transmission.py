@@ -19,7 +19,7 @@ import drjit as dr
 from pbrdf.optics.diffuse import minnaert_shape
 from pbrdf.optics.fresnel import transmittances
 from pbrdf.optics.geometry import Geometry, dot
-from pbrdf.optics.powers import polynomial
+from pbrdf.optics.powers import polynomial, power
 from pbrdf.optics.quadrature import Facet, facet_average, table
 
 __all__ = [
@@ -283,7 +283,7 @@ def visible_means(geometry: Geometry, k: Any, accuracy: str = "default", scale: 
             tail = _tail(1.0 - dr.abs(g) * inverse, s_z2 * inverse * inverse, 1.5 * p, tails)
             inner_integral = dr.select(g > 0.0, whole - tail, tail)
             valid = (product > 0.0) & (width > 0.0)
-            shape = dr.exp(p * dr.log(dr.select(valid, product, 1.0)))
+            shape = power(dr.select(valid, product, 1.0), p)
             factor = width * dr.select(j == 0, at_outer, dr.select(j == last, at_inner, 1.0))
             total = dr.fma(dr.select(valid, weight * factor, 0.0), shape * inner_integral, total)
         return j + 1, total, state
@@ -330,7 +330,7 @@ def _shifted_chebyshev(n: int) -> list[float]:
 
 def _tail(w: Any, y: Any, a: Any, coefficients: tuple[Any, ...]) -> Any:
     """∫ₓ¹ (1 − t²)^a dt with w = 1 − x, y = 1 − x²."""
-    return dr.exp((a + 1.0) * dr.log(dr.maximum(y, 1e-30))) * polynomial(w, coefficients)
+    return power(dr.maximum(y, 1e-30), a + 1.0) * polynomial(w, coefficients)
 
 
 def _inverse(weight: Any) -> Any:
