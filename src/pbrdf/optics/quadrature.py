@@ -123,57 +123,62 @@ def _clear_rules() -> tuple[list[tuple[float, ...]], list[tuple[int, int]]]:
 
 
 class _Tables(NamedTuple):
-    """Trapezoidal rules of all accuracies.
+    """Rules of rows of all accuracies.
 
     Attributes
     ----------
-    ranges_of
-        First row, number of rows and first pair of columns by accuracy.
+    first
+        First row of the rule for both edges by accuracy; as many rows of the rule for one edge follow.
     rows
-        Φ(z), 1 − Φ(z), weight, and how many pairs of columns a row of the rule for both edges has: the corners of the
-        square are left out.
-    columns
-        Φ(z) and 1 − Φ(z) of the pairs of columns ±z = ±step/2, ±3 step/2, …, and the weight of each.
+        Φ(z), 1 − Φ(z) and weight.
     ranges
-        First pair of points across a row of the rule for one edge, and number of pairs.
+        First pair of points of each row, and number of pairs.
     pairs
-        v and the weight of each of the points ±v.
+        Φ(v), 1 − Φ(v), weight and v of each of the points ±v: between both edges the trapezoidal rule from the middle
+        outwards, the corners of the square left out, along one edge those of Gauss and Hermite.
     """
 
-    ranges_of: dict[str, tuple[int, int, int]]
+    first: dict[str, int]
     rows: list[tuple[float, ...]]
-    columns: list[tuple[float, ...]]
     ranges: list[tuple[float, ...]]
     pairs: list[tuple[float, ...]]
 
 
 def _row_rules() -> _Tables:
-    tables = _Tables({}, [], [], [], [])
-    first: dict[int, int] = {}
+    tables = _Tables({}, [], [], [])
+    places: dict[int, int] = {}
     for name, rule in ACCURACIES.items():
         if rule is None:
             continue
-        tables.ranges_of[name] = len(tables.rows), 2 * rule.half + 1, len(tables.columns)
-        for j, (below, above, weight) in enumerate(_trapezoid(rule.step, 2 * rule.half + 1), -rule.half):
+        tables.first[name] = len(tables.rows)
+        rows = [(*_tails(z), weight, 0.0) for z, weight in _trapezoid(rule.step, 2 * rule.half + 1)]
+        tables.rows.extend((*rows, *rows))
+        places_across = range(-rule.half, rule.half + 1)
+        for j in places_across:
             reach = math.sqrt((rule.half + 0.4) ** 2 - j * j)
-            tables.rows.append((below, above, weight, min(rule.half, int(reach + 0.5))))
-            count = rule.across[abs(j)]
-            if count not in first:
-                first[count] = len(tables.pairs)
-                tables.pairs.extend(_pairs(count))
-            tables.ranges.append((first[count], count // 2))
-        columns = _trapezoid(rule.step, 2 * rule.half)
-        tables.columns.extend((*column, 0.0) for column in columns[rule.half :])
+            tables.ranges.append((len(tables.pairs), min(rule.half, int(reach + 0.5))))
+        columns = _trapezoid(rule.step, 2 * rule.half)[rule.half :]
+        tables.pairs.extend((*_tails(v), weight, v) for v, weight in columns)
+        for count in (rule.across[abs(j)] for j in places_across):
+            if count not in places:
+                places[count] = len(tables.pairs)
+                tables.pairs.extend((*_tails(v), weight, v) for v, weight in _pairs(count))
+            tables.ranges.append((places[count], count // 2))
     return tables
 
 
-def _trapezoid(step: float, count: int) -> list[tuple[float, float, float]]:
-    """Φ(z), 1 − Φ(z) and weights of equidistant points about 0 for the normal density."""
+def _trapezoid(step: float, count: int) -> list[tuple[float, float]]:
+    """Equidistant points about 0 and their weights for the normal density."""
     z = [(j - 0.5 * (count - 1)) * step for j in range(count)]
     weights = [math.exp(-0.5 * x * x) for x in z]
     total = math.fsum(weights)
-    below, above = ([0.5 * math.erfc(sign * x / math.sqrt(2.0)) for x in z] for sign in (-1.0, 1.0))
-    return [(a, b, w / total) for a, b, w in zip(below, above, weights, strict=True)]
+    return [(x, w / total) for x, w in zip(z, weights, strict=True)]
+
+
+def _tails(z: float) -> tuple[float, float]:
+    """Φ(z) and 1 − Φ(z)."""
+    below, above = (0.5 * math.erfc(sign * z / math.sqrt(2.0)) for sign in (-1.0, 1.0))
+    return below, above
 
 
 _CLEAR, _CLEAR_RANGES = _clear_rules()
@@ -304,14 +309,13 @@ def facet_average(
         sums.append(_sum_clear(integrand, size, state, [lanes(name) for name in RULES[:3]]))
     if rule in (None, "one_edge", "both_edges"):
         # the rule enters as opaque data, so that the accuracies share one kernel
-        rows = _Rows(
-            *(dr.opaque(UInt, x) for x in _TABLES.ranges_of[accuracy]),
-            *(_packets(F, numbers) for numbers in _TABLES[1:]),
-        )
-        if rule in (None, "one_edge"):
-            sums.append(_sum_edge(integrand, size, state, lanes("one_edge"), rows))
-        if rule in (None, "both_edges"):
-            sums.append(_sum_wedge(integrand, size, state, lanes("both_edges"), rows))
+        ends = _TABLES.first[accuracy], 2 * ACCURACIES[accuracy].half + 1
+        rows = _Rows(*(dr.opaque(UInt, x) for x in ends), *(_packets(F, numbers) for numbers in _TABLES[1:]))
+        if rule == "one_edge":
+            sums.append(_sum_edge(integrand, size, state, rows))
+        else:
+            along = lanes("one_edge")
+            sums.append(_sum_wedge(integrand, size, state, along | lanes("both_edges"), along, rows))
     return _added(*sums)
 
 
@@ -378,13 +382,11 @@ def _sum_clear(integrand: Callable[..., Any], size: int, state: Any, lanes: list
 
 
 class _Rows(NamedTuple):
-    """Rows of an accuracy: the first in the tables, their number, the first pair of columns, and the tables."""
+    """Rows of an accuracy: the first in the tables, the number for either kind, and the tables."""
 
     first: Any
     count: Any
-    first_column: Any
     rows: Callable[[Any], Any]
-    columns: Callable[[Any], Any]
     ranges: Callable[[Any], Any]
     pairs: Callable[[Any], Any]
 
@@ -393,21 +395,22 @@ class _Rows(NamedTuple):
 # they depend on.
 
 
-def _sum_edge(integrand: Callable[..., Any], size: int, state: Any, lanes: Any, rows: _Rows) -> list[Any]:
-    """Rows along the nearer edge."""
+def _sum_edge(integrand: Callable[..., Any], size: int, state: Any, rows: _Rows) -> list[Any]:
+    """Rows along the nearer edge, in all lanes."""
     UInt = type(rows.count)
 
     def row(j: Any, sigma: Any, vectors: Any, args: Any) -> list[Any]:
         geometry = Geometry(*vectors)
         (f, e), c_near, *_ = _nearer_edge_axes(geometry, *_edges(geometry, sigma))
-        below, above, weight, _ = rows.rows(rows.first + j)
-        first, count = (UInt(x) for x in rows.ranges(rows.first + j))
+        place = rows.first + rows.count + j
+        below, above, weight, _ = rows.rows(place)
+        first, count = (UInt(x) for x in rows.ranges(place))
         w, share = _between(below, above, 0.0, _tail(c_near))
         w = sigma * w
 
         def pair(j: Any, sigma: Any, vectors: Any, args: Any, row: Any) -> list[Any]:
             (x, y), length2, e, row_weight = row
-            v, weight = rows.pairs(first + j)
+            _, _, weight, v = rows.pairs(first + j)
             weight, v = row_weight * weight, sigma * v
             # e is perpendicular to (x, y)
             inverse = dr.rsqrt(dr.fma(v, v, length2))
@@ -417,25 +420,29 @@ def _sum_edge(integrand: Callable[..., Any], size: int, state: Any, lanes: Any, 
         inner = sigma, vectors, args, ((w * f[0], w * f[1]), dr.fma(w, w, 1.0), e, weight * share)
         return summed(pair, count, size, inner, differentiated((sigma, vectors, args)), "edge pairs")
 
-    return summed(row, dr.select(lanes, rows.count, UInt(0)), size, state, label="edge rows")
+    return summed(row, rows.count, size, state, label="edge rows")
 
 
-def _sum_wedge(integrand: Callable[..., Any], size: int, state: Any, lanes: Any, rows: _Rows) -> list[Any]:
-    """Rows between both edges."""
+def _sum_wedge(
+    integrand: Callable[..., Any], size: int, state: Any, lanes: Any, along: Any, rows: _Rows
+) -> list[Any]:
+    """Rows between both edges, or in the lanes ``along`` along the nearer one: one loop, which is compiled once."""
     UInt = type(rows.count)
+    begin = rows.first + dr.select(along, rows.count, UInt(0))
 
     def row(j: Any, sigma: Any, vectors: Any, args: Any) -> list[Any]:
         geometry = Geometry(*vectors)
-        f, e, beyond, lower, upper = _wedge_axes(geometry, *_edges(geometry, sigma))
-        below, above, weight, reach = rows.rows(rows.first + j)
-        count = UInt(reach)
+        f, e, beyond, lower, upper = _wedge_axes(geometry, *_edges(geometry, sigma), along)
+        below, above, weight, _ = rows.rows(begin + j)
+        first, count = (UInt(x) for x in rows.ranges(begin + j))
         w, share = _between(below, above, 0.0, beyond)
         ends = _tail(-dr.fma(lower[1], w, lower[0])), _tail(dr.fma(upper[1], w, upper[0]))
+        ends = tuple(dr.select(along, 0.0, tail) for tail in ends)
         w = sigma * w
 
         def pair(j: Any, sigma: Any, vectors: Any, args: Any, row: Any) -> list[Any]:
             (x, y), length2, e, row_weight, ends = row
-            below, above, weight, _ = rows.columns(rows.first_column + j)
+            below, above, weight, _ = rows.pairs(first + j)
             found = []
             for tails in ((below, above), (above, below)):
                 v, share = _between(*tails, *ends)
@@ -447,9 +454,9 @@ def _sum_wedge(integrand: Callable[..., Any], size: int, state: Any, lanes: Any,
             return _added(*found)
 
         inner = sigma, vectors, args, ((w * f[0], w * f[1]), dr.fma(w, w, 1.0), e, weight * share, ends)
-        return summed(pair, count, size, inner, differentiated((sigma, vectors, args)), "wedge columns")
+        return summed(pair, count, size, inner, differentiated((sigma, vectors, args)), "row pairs")
 
-    return summed(row, dr.select(lanes, rows.count, UInt(0)), size, state, label="wedge rows")
+    return summed(row, dr.select(lanes, rows.count, UInt(0)), size, state, label="rows")
 
 
 _MILLS_NUMERATOR = (
@@ -568,11 +575,14 @@ def _nearer_edge_axes(geometry: Geometry, c_i: Any, c_r: Any) -> tuple[Any, ...]
     return (f, e), dr.minimum(c_i, c_r), dr.maximum(c_i, c_r), -cos_phi, dr.abs(sin_phi)
 
 
-def _wedge_axes(geometry: Geometry, c_i: Any, c_r: Any) -> tuple[Any, ...]:
-    """Outer axis f, inner axis e, probability beyond the outer limit, inner limits (constant, slope in the outer)."""
+def _wedge_axes(geometry: Geometry, c_i: Any, c_r: Any, along: Any) -> tuple[Any, ...]:
+    """Outer axis f, inner axis e, probability beyond the outer limit, inner limits (constant, slope in the outer).
+
+    The inner axis is the nearer edge's where ``along``, else where that edge is the outer limit.
+    """
     cos_phi, sin_phi = -geometry.s_r[1], geometry.s_r[0]
     cos_d = -cos_phi  # a_i·a_r
-    same_side = cos_d >= -1e-9  # at a right angle, whichever way it is rounded
+    same_side = along | (cos_d >= -1e-9)  # at a right angle, whichever way it is rounded
 
     # same side: f across the nearer edge
     (f_same, e_same), c_near, c_far, _, sin_d = _nearer_edge_axes(geometry, c_i, c_r)
