@@ -440,21 +440,19 @@ def _sum_wedge(
         ends = tuple(dr.select(along, 0.0, tail) for tail in ends)
         w = sigma * w
 
-        def pair(j: Any, sigma: Any, vectors: Any, args: Any, row: Any) -> list[Any]:
+        def point(j: Any, sigma: Any, vectors: Any, args: Any, row: Any) -> list[Any]:
             (x, y), length2, e, row_weight, ends = row
-            below, above, weight, _ = rows.pairs(first + j)
-            found = []
-            for tails in ((below, above), (above, below)):
-                v, share = _between(*tails, *ends)
-                v = sigma * v
-                inverse = dr.rsqrt(dr.fma(v, v, length2))
-                slopes = dr.fma(e[0], v, x), dr.fma(e[1], v, y)
-                node_weight = row_weight * weight * share
-                found.append(_facet(integrand, *slopes, inverse, node_weight, vectors, args))
-            return _added(*found)
+            # of the two of a pair one by one: what is compiled is shorter
+            below, above, weight, _ = rows.pairs(first + (j >> 1))
+            odd = (j & 1) == 1
+            v, share = _between(dr.select(odd, above, below), dr.select(odd, below, above), *ends)
+            v = sigma * v
+            inverse = dr.rsqrt(dr.fma(v, v, length2))
+            slopes = dr.fma(e[0], v, x), dr.fma(e[1], v, y)
+            return _facet(integrand, *slopes, inverse, row_weight * weight * share, vectors, args)
 
         inner = sigma, vectors, args, ((w * f[0], w * f[1]), dr.fma(w, w, 1.0), e, weight * share, ends)
-        return summed(pair, count, size, inner, differentiated((sigma, vectors, args)), "row pairs")
+        return summed(point, 2 * count, size, inner, differentiated((sigma, vectors, args)), "row points")
 
     return summed(row, dr.select(lanes, rows.count, UInt(0)), size, state, label="rows")
 
