@@ -94,8 +94,6 @@ def _hermite(count: int) -> list[tuple[float, float]]:
 
 def _pairs(count: int) -> list[tuple[float, float]]:
     """Positive points of a Gauss-Hermite rule of an even number of points."""
-    if count == 0:
-        return []
     return [(x, w) for x, w in _hermite(count) if x > 0.0]
 
 
@@ -127,8 +125,8 @@ class _Tables(NamedTuple):
 
     Attributes
     ----------
-    first
-        First row of the rule for both edges by accuracy; as many rows of the rule for one edge follow.
+    places
+        First row between both edges by accuracy, number of rows, first row along one edge, and number of rows.
     rows
         Φ(z), 1 − Φ(z) and weight.
     ranges
@@ -138,7 +136,7 @@ class _Tables(NamedTuple):
         outwards, the corners of the square left out, along one edge those of Gauss and Hermite.
     """
 
-    first: dict[str, int]
+    places: dict[str, tuple[int, int, int, int]]
     rows: list[tuple[float, ...]]
     ranges: list[tuple[float, ...]]
     pairs: list[tuple[float, ...]]
@@ -146,24 +144,28 @@ class _Tables(NamedTuple):
 
 def _row_rules() -> _Tables:
     tables = _Tables({}, [], [], [])
-    places: dict[int, int] = {}
+    first: dict[int, int] = {}
     for name, rule in ACCURACIES.items():
         if rule is None:
             continue
-        tables.first[name] = len(tables.rows)
-        rows = [(*_tails(z), weight, 0.0) for z, weight in _trapezoid(rule.step, 2 * rule.half + 1)]
-        tables.rows.extend((*rows, *rows))
-        places_across = range(-rule.half, rule.half + 1)
-        for j in places_across:
+        rows = [
+            (j, (*_tails(z), weight, 0.0))
+            for j, (z, weight) in enumerate(_trapezoid(rule.step, 2 * rule.half + 1), -rule.half)
+        ]
+        along = [(rule.across[abs(j)], row) for j, row in rows if rule.across[abs(j)] > 0]
+        begin = len(tables.rows)
+        tables.places[name] = begin, len(rows), begin + len(rows), len(along)
+        tables.rows.extend(row for _, row in (*rows, *along))
+        for j, _ in rows:
             reach = math.sqrt((rule.half + 0.4) ** 2 - j * j)
             tables.ranges.append((len(tables.pairs), min(rule.half, int(reach + 0.5))))
         columns = _trapezoid(rule.step, 2 * rule.half)[rule.half :]
         tables.pairs.extend((*_tails(v), weight, v) for v, weight in columns)
-        for count in (rule.across[abs(j)] for j in places_across):
-            if count not in places:
-                places[count] = len(tables.pairs)
+        for count, _ in along:
+            if count not in first:
+                first[count] = len(tables.pairs)
                 tables.pairs.extend((*_tails(v), weight, v) for v, weight in _pairs(count))
-            tables.ranges.append((places[count], count // 2))
+            tables.ranges.append((first[count], count // 2))
     return tables
 
 
@@ -309,8 +311,10 @@ def facet_average(
         sums.append(_sum_clear(integrand, size, state, [lanes(name) for name in RULES[:3]]))
     if rule in (None, "one_edge", "both_edges"):
         # the rule enters as opaque data, so that the accuracies share one kernel
-        ends = _TABLES.first[accuracy], 2 * ACCURACIES[accuracy].half + 1
-        rows = _Rows(*(dr.opaque(UInt, x) for x in ends), *(_packets(F, numbers) for numbers in _TABLES[1:]))
+        rows = _Rows(
+            *(dr.opaque(UInt, x) for x in _TABLES.places[accuracy]),
+            *(_packets(F, numbers) for numbers in _TABLES[1:]),
+        )
         if rule == "one_edge":
             sums.append(_sum_edge(integrand, size, state, rows))
         else:
@@ -382,10 +386,12 @@ def _sum_clear(integrand: Callable[..., Any], size: int, state: Any, lanes: list
 
 
 class _Rows(NamedTuple):
-    """Rows of an accuracy: the first in the tables, the number for either kind, and the tables."""
+    """Rows of an accuracy: the first between both edges in the tables, their number, those along one edge, tables."""
 
     first: Any
     count: Any
+    first_along: Any
+    count_along: Any
     rows: Callable[[Any], Any]
     ranges: Callable[[Any], Any]
     pairs: Callable[[Any], Any]
@@ -402,9 +408,8 @@ def _sum_edge(integrand: Callable[..., Any], size: int, state: Any, rows: _Rows)
     def row(j: Any, sigma: Any, vectors: Any, args: Any) -> list[Any]:
         geometry = Geometry(*vectors)
         (f, e), c_near, *_ = _nearer_edge_axes(geometry, *_edges(geometry, sigma))
-        place = rows.first + rows.count + j
-        below, above, weight, _ = rows.rows(place)
-        first, count = (UInt(x) for x in rows.ranges(place))
+        below, above, weight, _ = rows.rows(rows.first_along + j)
+        first, count = (UInt(x) for x in rows.ranges(rows.first_along + j))
         w, share = _between(below, above, 0.0, _tail(c_near))
         w = sigma * w
 
@@ -420,7 +425,7 @@ def _sum_edge(integrand: Callable[..., Any], size: int, state: Any, rows: _Rows)
         inner = sigma, vectors, args, ((w * f[0], w * f[1]), dr.fma(w, w, 1.0), e, weight * share)
         return summed(pair, count, size, inner, differentiated((sigma, vectors, args)), "edge pairs")
 
-    return summed(row, rows.count, size, state, label="edge rows")
+    return summed(row, rows.count_along, size, state, label="edge rows")
 
 
 def _sum_wedge(
@@ -428,7 +433,8 @@ def _sum_wedge(
 ) -> list[Any]:
     """Rows between both edges, or in the lanes ``along`` along the nearer one: one loop, which is compiled once."""
     UInt = type(rows.count)
-    begin = rows.first + dr.select(along, rows.count, UInt(0))
+    begin = dr.select(along, rows.first_along, rows.first)
+    number = dr.select(along, rows.count_along, rows.count)
 
     def row(j: Any, sigma: Any, vectors: Any, args: Any) -> list[Any]:
         geometry = Geometry(*vectors)
@@ -454,7 +460,7 @@ def _sum_wedge(
         inner = sigma, vectors, args, ((w * f[0], w * f[1]), dr.fma(w, w, 1.0), e, weight * share, ends)
         return summed(point, 2 * count, size, inner, differentiated((sigma, vectors, args)), "row points")
 
-    return summed(row, dr.select(lanes, rows.count, UInt(0)), size, state, label="rows")
+    return summed(row, dr.select(lanes, number, UInt(0)), size, state, label="rows")
 
 
 _MILLS_NUMERATOR = (
@@ -478,10 +484,20 @@ _MILLS_DENOMINATOR = (
 
 def _tail(x: Any) -> Any:
     """1 − Φ(x), ends at ±9; relative error 2e-11 for x > 0 (minimax)."""
-    t = dr.minimum(dr.abs(x), _REACH)
+    place = dr.detach(x)
+    t = dr.minimum(dr.abs(place), _REACH)
     ratio = polynomial(t, _MILLS_NUMERATOR) / polynomial(t, _MILLS_DENOMINATOR)
-    tail = (1.0 / math.sqrt(2.0 * math.pi)) * dr.exp(-0.5 * t * t) * ratio
-    return dr.select(x < 0.0, 1.0 - tail, tail)
+    density = (1.0 / math.sqrt(2.0 * math.pi)) * dr.exp(-0.5 * t * t)
+    tail = density * ratio
+    return _tied(dr.select(place < 0.0, 1.0 - tail, tail), x, -density)
+
+
+def _tied(value: Any, x: Any, slope: Any) -> Any:
+    """A value with its derivative by x, which takes fewer operations than that of a rational function."""
+    if not dr.grad_enabled(x):
+        return value
+    tied: Any = dr.replace_grad  # its stub says that it returns nothing
+    return tied(value, slope * x)
 
 
 _SLOPE_NUMERATOR = (
@@ -520,8 +536,11 @@ def _between(below: Any, above: Any, low: Any, high: Any) -> tuple[Any, Any]:
     share = dr.maximum((1.0 - low) - high, 0.0)
     left, right = dr.fma(share, below, low), dr.fma(share, above, high)
     # x with the smaller of the two tails p, as a rational function of √(−2 log p)
-    t = dr.sqrt(-2.0 * dr.log(dr.clip(dr.minimum(left, right), 1e-18, 0.5)))
+    p = dr.clip(dr.minimum(left, right), 1e-18, 0.5)
+    t = dr.sqrt(-2.0 * dr.log(dr.detach(p)))
     x = polynomial(t, _SLOPE_NUMERATOR) / polynomial(t, _SLOPE_DENOMINATOR)
+    if dr.grad_enabled(p):
+        x = _tied(x, p, -math.sqrt(2.0 * math.pi) * dr.exp(0.5 * x * x))
     return dr.select(left < right, -x, x), share
 
 
