@@ -449,10 +449,10 @@ def _sum_wedge(
         def point(j: Any, sigma: Any, vectors: Any, args: Any, row: Any) -> list[Any]:
             (x, y), length2, e, row_weight, ends = row
             # of the two of a pair one by one: what is compiled is shorter
-            below, above, weight, _ = rows.pairs(first + (j >> 1))
+            below, above, weight, whole = rows.pairs(first + (j >> 1))
             odd = (j & 1) == 1
             v, share = _between(dr.select(odd, above, below), dr.select(odd, below, above), *ends)
-            v = sigma * v
+            v = sigma * dr.select(along, dr.select(odd, -whole, whole), v)
             inverse = dr.rsqrt(dr.fma(v, v, length2))
             slopes = dr.fma(e[0], v, x), dr.fma(e[1], v, y)
             return _facet(integrand, *slopes, inverse, row_weight * weight * share, vectors, args)
