@@ -190,10 +190,12 @@ def test_choice_of_rule(jit, accuracy, c_i, c_r, sigma, k, rule):
 
 def test_number_of_points():
     """What a direction costs: points of each of the default rules."""
-    first, count, _ = quadrature._TABLES.ranges_of["default"]
+    between, rows, along, edge_rows = quadrature._TABLES.places["default"]
     clear = [2 * length for _, length in quadrature._CLEAR_RANGES]
-    one = sum(2 * pairs for _, pairs in quadrature._TABLES.ranges[first : first + count])
-    both = sum(2 * row[3] for row in quadrature._TABLES.rows[first : first + count])
+    both, one = (
+        sum(2 * pairs for _, pairs in quadrature._TABLES.ranges[first : first + count])
+        for first, count in ((between, rows), (along, edge_rows))
+    )
     assert clear == [8, 14, 26] and (one, both) == (36, 128)
 
 

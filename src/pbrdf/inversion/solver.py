@@ -802,16 +802,26 @@ def _bounded_step(
     import drjit as dr
 
     size = len(u)
-    held = _leaving(g, u, low, high)
-    known = [dr.zeros(type(u[0]), 1) for _ in range(size)]
-    step = _damped_step(A, g, damping, held, known)
-    for _ in range(BOUND_PASSES):
+    Float, UInt32 = type(u[0]), dr.uint32_array_t(type(u[0]))
+
+    # a loop, so that the equations are compiled once
+    def body(turn: Any, held: list[Any], known: list[Any], step: list[Any]) -> tuple[Any, ...]:
         outside = [~held[i] & ((u[i] + step[i] < low[i]) | (u[i] + step[i] > high[i])) for i in range(size)]
-        for i in range(size):
-            known[i] = dr.select(outside[i], dr.clip(u[i] + step[i], low[i], high[i]) - u[i], known[i])
-            held[i] = held[i] | outside[i]
-        step = _damped_step(A, g, damping, held, known)
-    return step
+        known = [
+            dr.select(outside[i], dr.clip(u[i] + step[i], low[i], high[i]) - u[i], known[i])
+            for i in range(size)
+        ]
+        held = [held[i] | outside[i] for i in range(size)]
+        return turn + 1, held, known, _damped_step(A, g, damping, held, known)
+
+    zeros = [Float(0.0) for _ in range(size)]
+    return dr.while_loop(
+        (UInt32(0), _leaving(g, u, low, high), zeros, list(zeros)),
+        lambda turn, *_: turn <= BOUND_PASSES,
+        body,
+        mode="symbolic",
+        label="bounded step",
+    )[3]
 
 
 def _damped_step(

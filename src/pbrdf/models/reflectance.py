@@ -89,5 +89,7 @@ def _diffuse_reflectance(model: Model, theta_i: np.ndarray) -> np.ndarray:
     cos_r = s * s
     solid_angle = (0.5 * weight * 2.0 * s)[:, None] * (2.0 * math.pi / AZIMUTHS)  # both halves of the azimuth
     phi = (np.arange(AZIMUTHS) + 0.5) * math.pi / AZIMUTHS
-    f = brdf(model, theta_i[:, None, None], np.arccos(cos_r)[:, None], phi, "diffuse")
+    directions = theta_i[:, None, None], np.arccos(cos_r)[:, None], phi
+    # kernels that stand already: that of the specular part, and that of whole matrices
+    f = model.mueller(*directions)[..., 0, 0] - brdf(model, *directions, "specular")
     return (f * cos_r[:, None] * solid_angle).sum((1, 2))

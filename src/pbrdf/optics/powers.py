@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import drjit as dr
 
-__all__ = ["exp2", "is_single", "log2", "polynomial", "power"]
+__all__ = ["exp2", "is_single", "log2", "polynomial", "power", "with_slope"]
 
 #: log2(1 + f)/f for |f| ≤ 1/3, absolute error of f times it 3e-7 (minimax).
 _LOG2 = (1.44269359, -0.721402698, 0.481066781, -0.357728874, 0.283652863, -0.284250975, 0.257091115)
@@ -79,7 +79,7 @@ def log2(x: Any) -> Any:
     else:
         s = f / (mantissa + 1.0)
         value = dr.fma(s, polynomial(s * s, _ARTANH), F(octave))
-    return _tied(value, x, lambda: dr.rcp(dr.detach(x) * _LN2))
+    return with_slope(value, x, lambda: dr.rcp(dr.detach(x) * _LN2))
 
 
 def exp2(x: Any) -> Any:
@@ -97,10 +97,10 @@ def exp2(x: Any) -> Any:
     whole: Any = dr.reinterpret_array(Int, shifted)
     part: Any = dr.reinterpret_array(Int, polynomial(y - (shifted - rounding), own.exp2))
     value: Any = dr.reinterpret_array(F, part + (whole << own.mantissa))
-    return _tied(value, x, lambda: value * _LN2)
+    return with_slope(value, x, lambda: value * _LN2)
 
 
-def _tied(value: Any, x: Any, slope: Callable[[], Any]) -> Any:
+def with_slope(value: Any, x: Any, slope: Callable[[], Any]) -> Any:
     """A value with its derivative by a variable."""
     if not dr.grad_enabled(x):
         return value

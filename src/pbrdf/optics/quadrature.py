@@ -34,7 +34,7 @@ import drjit as dr
 import numpy as np
 
 from pbrdf.optics.geometry import Geometry, Vector
-from pbrdf.optics.powers import exp2, is_single, log2, polynomial
+from pbrdf.optics.powers import exp2, is_single, log2, polynomial, with_slope
 from pbrdf.optics.reference_planes import tilt_rotation
 from pbrdf.optics.summation import differentiated, summed
 from pbrdf.optics.transport import transported_rows
@@ -180,50 +180,50 @@ def _clear_rules() -> tuple[list[tuple[float, ...]], list[tuple[int, int]]]:
 
 
 class _Tables(NamedTuple):
-    """Trapezoidal rules of all accuracies.
+    """Rows of all accuracies.
 
     Attributes
     ----------
-    ranges_of
-        First row, number of rows and first pair of columns by accuracy.
+    places
+        By accuracy: first row between both edges and number of rows, first row along one edge and number of these.
     rows
-        Φ(z), 1 − Φ(z), weight, and how many pairs of columns a row of the rule for both edges has: the corners of the
-        square are left out.
-    columns
-        Φ(z) and 1 − Φ(z) of the pairs of columns ±z = ±step/2, ±3 step/2, …, and the weight of each.
+        Φ(z), 1 − Φ(z) and weight, z on a trapezoidal rule; and 0.
     ranges
-        First pair of points across a row of the rule for one edge, and number of pairs.
+        First pair of points of a row, and number of its pairs: between both edges the corners of the square are left
+        out. Rows along one edge that have as many points follow each other.
     pairs
-        v and the weight of each of the points ±v.
+        Φ(v) and 1 − Φ(v) of each of the points ±v, the weight of each, and v.
     """
 
-    ranges_of: dict[str, tuple[int, int, int]]
+    places: dict[str, tuple[int, int, int, int]]
     rows: list[tuple[float, ...]]
-    columns: list[tuple[float, ...]]
     ranges: list[tuple[float, ...]]
     pairs: list[tuple[float, ...]]
 
 
 def _row_rules() -> _Tables:
-    tables = _Tables({}, [], [], [], [])
+    tables = _Tables({}, [], [], [])
     first: dict[int, int] = {}
     for name, rule in (*ACCURACIES.items(), (PACKET_RULE, _PACKET_ACCURACY)):
         if rule is None:
             continue
-        tables.ranges_of[name] = len(tables.rows), 2 * rule.half + 1, len(tables.columns)
         trapezoid = _trapezoid(rule.step, 2 * rule.half + 1)
-        # from the middle on, so that rows of as many points follow each other
-        for j in sorted(range(-rule.half, rule.half + 1), key=abs):
-            below, above, weight = trapezoid[rule.half + j]
+        rows = {j: (_phi(z), _phi(-z), weight, 0.0) for j, (z, weight) in enumerate(trapezoid, -rule.half)}
+        # from the middle on; rows without points are left out
+        along = [j for j in sorted(rows, key=abs) if rule.across[abs(j)] > 0]
+        begin = len(tables.rows)
+        tables.places[name] = begin, len(rows), begin + len(rows), len(along)
+        tables.rows.extend([*rows.values(), *(rows[j] for j in along)])
+        for j in rows:
             reach = math.sqrt((rule.half + 0.4) ** 2 - j * j)
-            tables.rows.append((below, above, weight, min(rule.half, int(reach + 0.5))))
-            count = rule.across[abs(j)]
+            tables.ranges.append((len(tables.pairs), min(rule.half, int(reach + 0.5))))
+        columns = _trapezoid(rule.step, 2 * rule.half)[rule.half :]
+        tables.pairs.extend((_phi(v), _phi(-v), weight, v) for v, weight in columns)
+        for count in (rule.across[abs(j)] for j in along):
             if count not in first:
                 first[count] = len(tables.pairs)
-                tables.pairs.extend(_pairs(count))
+                tables.pairs.extend((_phi(v), _phi(-v), weight, v) for v, weight in _pairs(count))
             tables.ranges.append((first[count], count // 2))
-        columns = _trapezoid(rule.step, 2 * rule.half)
-        tables.columns.extend((*column, 0.0) for column in columns[rule.half :])
     return tables
 
 
@@ -232,13 +232,12 @@ def _phi(z: float) -> float:
     return 0.5 * math.erfc(-z / math.sqrt(2.0))
 
 
-def _trapezoid(step: float, count: int) -> list[tuple[float, float, float]]:
-    """Φ(z), 1 − Φ(z) and weights of equidistant points about 0 for the normal density."""
+def _trapezoid(step: float, count: int) -> list[tuple[float, float]]:
+    """Equidistant points about 0 and their weights for the normal density."""
     z = [(j - 0.5 * (count - 1)) * step for j in range(count)]
     weights = [math.exp(-0.5 * x * x) for x in z]
     total = math.fsum(weights)
-    below, above = ([_phi(sign * x) for x in z] for sign in (1.0, -1.0))
-    return [(a, b, w / total) for a, b, w in zip(below, above, weights, strict=True)]
+    return [(x, w / total) for x, w in zip(z, weights, strict=True)]
 
 
 _CLEAR, _CLEAR_RANGES = _clear_rules()
@@ -359,38 +358,38 @@ def facet_average(
     if rule in RULES[:3]:
         return _sum_clear(integrand, size, state, _CLEAR.__getitem__, *_CLEAR_RANGES[RULES.index(rule)])
     tables = [_packets(F, numbers) for numbers in _TABLES[1:]]
-    first, count, first_column = _TABLES.ranges_of[accuracy]
+    place = _TABLES.places[accuracy]
     if rule == "one_edge":
         # a loop over rows of as many points, without another one within them
-        own = _TABLES.ranges[first : first + count]
-        rows = _Rows(first, UInt(count), 0, *tables)._replace(pairs=_TABLES.pairs.__getitem__)
+        own = _TABLES.ranges[place[2] : place[2] + place[3]]
+        rows = _Rows(*place, *tables)._replace(pairs=_TABLES.pairs.__getitem__)
         return _added(
-            *(
-                _sum_edge(integrand, size, state, True, _alike(rows, own, across))
-                for across in sorted({pairs for pairs in own if pairs[1] > 0})
-            )
+            *(_sum_edge(integrand, size, state, _alike(rows, own, pairs)) for pairs in sorted(set(own)))
         )
 
     # the accuracy enters as opaque data, so that all share one kernel
-    rows = _Rows(*(dr.opaque(UInt, x) for x in (first, count, first_column)), *tables)
+    rows = _Rows(*(dr.opaque(UInt, x) for x in place), *tables)
     if rule == "both_edges":
-        return _sum_wedge(integrand, size, state, True, rows)
+        return _sum_wedge(integrand, size, state, True, False, rows)
     index = choose_rule(*_edges(geometry, sigma), sigma, steepness, accuracy, lambda x: dr.opaque(F, x))
     start, count = UInt(0), UInt(0)
-    for place, (first, length) in enumerate(_CLEAR_RANGES):
-        start = dr.select(index == place, UInt(first), start)
-        count = dr.select(index == place, UInt(length), count)
+    for j, (first, length) in enumerate(_CLEAR_RANGES):
+        start = dr.select(index == j, UInt(first), start)
+        count = dr.select(index == j, UInt(length), count)
+    along = index == RULES.index("one_edge")
     return _added(
         _sum_clear(integrand, size, state, _packets(F, _CLEAR), start, count),
-        _sum_edge(integrand, size, state, index == RULES.index("one_edge"), rows),
-        _sum_wedge(integrand, size, state, index == RULES.index("both_edges"), rows),
+        _sum_wedge(integrand, size, state, along | (index == RULES.index("both_edges")), along, rows),
     )
 
 
 def _alike(rows: _Rows, ranges: list[tuple[float, ...]], own: tuple[float, ...]) -> _Rows:
-    """Those of some rows that have this range of pairs; they follow each other."""
-    first, count = rows.first + ranges.index(own), type(rows.count)(ranges.count(own))
-    return rows._replace(first=first, count=count, ranges=lambda _: own)
+    """Those of the rows along one edge that have this range of pairs; they follow each other."""
+    return rows._replace(
+        first_along=rows.first_along + ranges.index(own),
+        count_along=ranges.count(own),
+        ranges=lambda _: own,
+    )
 
 
 def _pair(
@@ -453,13 +452,13 @@ def _sum_clear(
 
 
 class _Rows(NamedTuple):
-    """Rows of an accuracy: the first in the tables, their number, the first pair of columns, and the tables."""
+    """Rows of an accuracy: the first between both edges, their number, the same along one edge, and the tables."""
 
     first: Any
     count: Any
-    first_column: Any
+    first_along: Any
+    count_along: Any
     rows: Callable[[Any], Any]
-    columns: Callable[[Any], Any]
     ranges: Callable[[Any], Any]
     pairs: Callable[[Any], Any]
 
@@ -468,21 +467,21 @@ class _Rows(NamedTuple):
 # they depend on.
 
 
-def _sum_edge(integrand: Callable[..., Any], size: int, state: Any, lanes: Any, rows: _Rows) -> list[Any]:
-    """Rows along the nearer edge."""
-    UInt = type(rows.count)
+def _sum_edge(integrand: Callable[..., Any], size: int, state: Any, rows: _Rows) -> list[Any]:
+    """Rows along the nearer edge, as many points in each, in all lanes."""
+    UInt = dr.uint32_array_t(type(state[0]))
+    first, count = rows.ranges(0)
 
     def row(j: Any, sigma: Any, vectors: Any, args: Any) -> list[Any]:
         geometry = Geometry(*vectors)
         (f, e), c_near, *_ = _nearer_edge_axes(geometry, *_edges(geometry, sigma))
-        below, above, weight, _ = rows.rows(rows.first + j)
-        first, count = (x if isinstance(x, int) else UInt(x) for x in rows.ranges(rows.first + j))
+        below, above, weight, _ = rows.rows(rows.first_along + j)
         w, share = _between(below, above, 0.0, _tail(c_near))
         w = sigma * w
 
         def pair(j: Any, sigma: Any, vectors: Any, args: Any, row: Any) -> list[Any]:
             (x, y), length2, e, row_weight = row
-            v, weight = rows.pairs(first + j)
+            _, _, weight, v = rows.pairs(first + j)
             weight, v = row_weight * weight, sigma * v
             # e is perpendicular to (x, y)
             inverse = dr.rsqrt(dr.fma(v, v, length2))
@@ -492,44 +491,47 @@ def _sum_edge(integrand: Callable[..., Any], size: int, state: Any, lanes: Any, 
         inner = sigma, vectors, args, ((w * f[0], w * f[1]), dr.fma(w, w, 1.0), e, weight * share)
         return summed(pair, count, size, inner, differentiated((sigma, vectors, args)), "edge pairs")
 
-    return summed(row, dr.select(lanes, rows.count, UInt(0)), size, state, label="edge rows")
+    return summed(row, UInt(rows.count_along), size, state, label="edge rows")
 
 
-def _sum_wedge(integrand: Callable[..., Any], size: int, state: Any, lanes: Any, rows: _Rows) -> list[Any]:
-    """Rows between both edges."""
+def _sum_wedge(
+    integrand: Callable[..., Any], size: int, state: Any, lanes: Any, along: Any, rows: _Rows
+) -> list[Any]:
+    """Rows between both edges, or in the lanes ``along`` along the nearer one: one loop, which is compiled once."""
     UInt = type(rows.count)
+    begin = dr.select(along, rows.first_along, rows.first)
+    number = dr.select(along, rows.count_along, rows.count)
 
     def axes(sigma: Any, vectors: Any) -> tuple[Any, ...]:
         geometry = Geometry(*vectors)
-        return _wedge_axes(geometry, *_edges(geometry, sigma))
+        return _wedge_axes(geometry, *_edges(geometry, sigma), along)
 
     known = None if differentiated(state) else axes(*state[:2])
 
     def row(j: Any, sigma: Any, vectors: Any, args: Any) -> list[Any]:
         f, e, beyond, lower, upper = known or axes(sigma, vectors)
-        below, above, weight, reach = rows.rows(rows.first + j)
-        count = UInt(reach)
+        below, above, weight, _ = rows.rows(begin + j)
+        first, count = (UInt(x) for x in rows.ranges(begin + j))
         w, share = _between(below, above, 0.0, beyond)
         ends = _tail(-dr.fma(lower[1], w, lower[0])), _tail(dr.fma(upper[1], w, upper[0]))
+        ends = tuple(dr.select(along, 0.0, tail) for tail in ends)
         w = sigma * w
 
-        def pair(j: Any, sigma: Any, vectors: Any, args: Any, row: Any) -> list[Any]:
+        def point(j: Any, sigma: Any, vectors: Any, args: Any, row: Any) -> list[Any]:
             (x, y), length2, e, row_weight, ends = row
-            below, above, weight, _ = rows.columns(rows.first_column + j)
-            found = []
-            for tails in ((below, above), (above, below)):
-                v, share = _between(*tails, *ends)
-                v = sigma * v
-                inverse = dr.rsqrt(dr.fma(v, v, length2))
-                slopes = dr.fma(e[0], v, x), dr.fma(e[1], v, y)
-                node_weight = row_weight * weight * share
-                found.append(_within(integrand, *slopes, inverse, node_weight, vectors, args))
-            return _added(*found)
+            # of the two of a pair one by one: what is compiled is shorter
+            below, above, weight, whole = rows.pairs(first + (j >> 1))
+            odd = (j & 1) == 1
+            v, share = _between(dr.select(odd, above, below), dr.select(odd, below, above), *ends)
+            v = sigma * dr.select(along, dr.select(odd, -whole, whole), v)
+            inverse = dr.rsqrt(dr.fma(v, v, length2))
+            slopes = dr.fma(e[0], v, x), dr.fma(e[1], v, y)
+            return _within(integrand, *slopes, inverse, row_weight * weight * share, vectors, args)
 
         inner = sigma, vectors, args, ((w * f[0], w * f[1]), dr.fma(w, w, 1.0), e, weight * share, ends)
-        return summed(pair, count, size, inner, differentiated((sigma, vectors, args)), "wedge columns")
+        return summed(point, 2 * count, size, inner, differentiated((sigma, vectors, args)), "row points")
 
-    return summed(row, dr.select(lanes, rows.count, UInt(0)), size, state, label="wedge rows")
+    return summed(row, dr.select(lanes, number, UInt(0)), size, state, label="rows")
 
 
 def _packet_average(
@@ -568,10 +570,10 @@ def _packet_average(
     one_edge = c_far > _PACKET_FAR
     count = dr.select(one_edge, UInt(len(_PACKET_ROWS)), UInt(0))
     along = summed(row, count, size, state, label="packet rows")
-    ranges = zip(_TABLES.ranges_of[PACKET_RULE], _TABLES.ranges_of["default"], strict=True)
-    level = (dr.select(c_far > _PACKET_COARSE, UInt(few), UInt(many)) for few, many in ranges)
+    places = zip(_TABLES.places[PACKET_RULE], _TABLES.places["default"], strict=True)
+    level = (dr.select(c_far > _PACKET_COARSE, UInt(few), UInt(many)) for few, many in places)
     rows = _Rows(*level, *(_packets(F, numbers) for numbers in _TABLES[1:]))
-    return _added(along, _sum_wedge(integrand, size, state, ~one_edge, rows))
+    return _added(along, _sum_wedge(integrand, size, state, c_far <= _PACKET_FAR, False, rows))
 
 
 _MILLS_NUMERATOR = (
@@ -595,10 +597,12 @@ _MILLS_DENOMINATOR = (
 
 def _tail(x: Any) -> Any:
     """1 − Φ(x), ends at ±9; relative error 2e-11 for x > 0 (minimax)."""
-    t = dr.minimum(dr.abs(x), _REACH)
+    place = dr.detach(x)
+    t = dr.minimum(dr.abs(place), _REACH)
     ratio = polynomial(t, _MILLS_NUMERATOR) / polynomial(t, _MILLS_DENOMINATOR)
-    tail = (1.0 / math.sqrt(2.0 * math.pi)) * exp2((-0.5 / _LN2) * t * t) * ratio
-    return dr.select(x < 0.0, 1.0 - tail, tail)
+    density = (1.0 / math.sqrt(2.0 * math.pi)) * exp2((-0.5 / _LN2) * t * t)
+    tail = density * ratio
+    return with_slope(dr.select(place < 0.0, 1.0 - tail, tail), x, lambda: -density)
 
 
 _SLOPE_NUMERATOR = (
@@ -647,11 +651,15 @@ def _between(below: Any, above: Any, low: Any, high: Any) -> tuple[Any, Any]:
     single = is_single(p) and not dr.grad_enabled(p)
     least = 1e-9 if single else 1e-18
     p = dr.select(p < least, least, dr.select(p > 0.5, 0.5, p))
-    t = dr.sqrt((-2.0 * _LN2) * log2(p))
+    t = dr.sqrt((-2.0 * _LN2) * log2(dr.detach(p)))
     if single:
         x = polynomial(t, _SINGLE_NUMERATOR) / polynomial(t, _SINGLE_DENOMINATOR)
     else:
         x = polynomial(t, _SLOPE_NUMERATOR) / polynomial(t, _SLOPE_DENOMINATOR)
+        # that of the normal distribution, which is shorter than that of the rational function
+        x = with_slope(
+            x, p, lambda: -math.sqrt(2.0 * math.pi) * exp2((0.5 / _LN2) * dr.detach(x) * dr.detach(x))
+        )
     return dr.select(lower, -x, x), share
 
 
@@ -706,11 +714,14 @@ def _nearer_edge_axes(geometry: Geometry, c_i: Any, c_r: Any) -> tuple[Any, ...]
     return (f, e), dr.minimum(c_i, c_r), dr.maximum(c_i, c_r), -cos_phi, dr.abs(sin_phi)
 
 
-def _wedge_axes(geometry: Geometry, c_i: Any, c_r: Any) -> tuple[Any, ...]:
-    """Outer axis f, inner axis e, probability beyond the outer limit, inner limits (constant, slope in the outer)."""
+def _wedge_axes(geometry: Geometry, c_i: Any, c_r: Any, along: Any) -> tuple[Any, ...]:
+    """Outer axis f, inner axis e, probability beyond the outer limit, inner limits (constant, slope in the outer).
+
+    The inner axis is the nearer edge's where ``along``, else where that edge is the outer limit.
+    """
     cos_phi, sin_phi = -geometry.s_r[1], geometry.s_r[0]
     cos_d = -cos_phi  # a_i·a_r
-    same_side = cos_d >= -1e-9  # at a right angle, whichever way it is rounded
+    same_side = along | (cos_d >= -1e-9)  # at a right angle, whichever way it is rounded
 
     # same side: f across the nearer edge
     (f_same, e_same), c_near, c_far, _, sin_d = _nearer_edge_axes(geometry, c_i, c_r)

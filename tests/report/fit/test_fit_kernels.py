@@ -32,7 +32,7 @@ def test_figures_need_no_kernel_but_that_of_the_comparison(report, launched):
     assert launched() == compared and len(compared) == 1
 
 
-def test_checks_of_a_good_fit_launch_a_specular_a_diffuse_and_a_whole_kernel(report, launched):
+def test_checks_of_a_good_fit_launch_a_specular_and_a_whole_kernel(report, launched):
     """No refit: χ² of the optimum is asked for only where a combination of parameters is nearly free."""
     run_checks(report.result, report.dataset)
-    assert len(launched()) == 3
+    assert len(launched()) == 2
