@@ -36,6 +36,7 @@ from pbrdf.inversion.stack import Stack
 from pbrdf.inversion.starts import sobol_starts
 from pbrdf.inversion.unknowns import bounds_of_each, check_choices, space_of, with_terms
 from pbrdf.models import DoubleGauss, Model
+from pbrdf.optics.stokes import STOKES
 from pbrdf.version import __version__
 
 if TYPE_CHECKING:
@@ -640,7 +641,8 @@ def _form(dataset: xr.Dataset, dims: Sequence[str]) -> xr.Dataset:
             shape = [dataset.sizes[d] for d in wanted]
             ones = np.ones(shape, dtype=variable.dtype)
             if name == COVARIANCE:
-                ones[:] = np.eye(4)
+                known = [n in dataset.data_vars and std_name(n) in dataset.data_vars for n in STOKES]
+                ones[:] = np.where(np.outer(known, known), np.eye(4), np.nan)
             variables[name] = (wanted, ones)
         elif name in _ANGLES and len(own) < len(variable.dims):
             if own != (DIMENSION,):
