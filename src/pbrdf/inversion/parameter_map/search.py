@@ -217,10 +217,10 @@ def standing_out(
     size = np.log(np.maximum(reduced, 1e-300))
     finite = np.isfinite(size)
     expected = np.sqrt(2.0 / freedom)
-    cell = np.unique(cells(shape, places, NEIGHBOURHOOD), return_inverse=True)[1].ravel()
+    usual = np.median(size[finite]) if finite.any() else 0.0
+    around = _medians(np.where(finite, size, np.inf), cells(shape, places, NEIGHBOURHOOD))
     result = np.full(len(cost), -np.inf)
-    for group in (cell, np.zeros(len(cost), dtype=int)):
-        above = size - _medians(np.where(finite, size, np.inf), group)[group]
+    for above in (size - around, size - usual):
         scatter = 1.4826 * np.median(np.abs(above[finite])) if finite.any() else 0.0
         result = np.maximum(result, above / np.maximum(expected, scatter))
     result = np.maximum(result, np.where(std_known, (reduced - 1.0) / expected, -np.inf))
@@ -232,8 +232,10 @@ def _reduced(cost: np.ndarray, freedom: np.ndarray) -> np.ndarray:
 
 
 def _medians(values: np.ndarray, group: np.ndarray) -> np.ndarray:
-    """Median of the values of each group, the lower one of two."""
+    """Median of the values of the group of each, the lower one of two."""
     order = np.lexsort((values, group))
     begin = np.flatnonzero(np.diff(group[order], prepend=-1))
     size = np.diff(np.append(begin, len(order)))
-    return values[order[begin + (size - 1) // 2]]
+    result = np.empty(len(values))
+    result[order] = np.repeat(values[order[begin + (size - 1) // 2]], size)
+    return result
