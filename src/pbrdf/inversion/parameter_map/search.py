@@ -15,6 +15,7 @@ All depends on the block alone, and on no chance but the seed.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -28,7 +29,7 @@ __all__ = ["fit_pixels", "standing_out"]
 #: A start suits if its χ² is no more than so many times what is expected, plus the last term for each unknown.
 SUITS, FOR_EACH_UNKNOWN = 1.5, 4.0
 #: A pixel whose χ² is so many deviations above its like is offered what its neighbours found; is tried again from many
-#: starts.
+#: starts, or at as many as the largest of so many normal variables has: √(2 ln B).
 OFFERED, TRIED_AGAIN = 2.0, 3.5
 #: Pixels tried again at first: so many, or one in so many; each time that it helps one in HELPS, MORE times as many.
 AT_FIRST, ONE_IN, HELPS, MORE = 16, 4096, 20, 4
@@ -138,10 +139,11 @@ def _undo_wrong_ones(
     _spread(pixels, ends, beside, _offer(pixels, ends, beside, np.flatnonzero(deviations() > OFFERED)))
     tried = np.zeros(len(places), dtype=bool)
     most = max(AT_FIRST, len(places) // ONE_IN)
+    limit = max(TRIED_AGAIN, math.sqrt(2.0 * math.log(len(places))))
     while True:
         z = np.where(tried, -np.inf, deviations())
         again = np.argsort(-z, kind="stable")[:most]
-        again = np.sort(again[z[again] > TRIED_AGAIN])
+        again = np.sort(again[z[again] > limit])
         if not len(again):
             return
         tried[again] = True
