@@ -22,6 +22,7 @@ VARIABLES = {
     "standard_error": (("parameter",), np.float64),
     "chi2": ((), np.float64),
     "optima": ((), np.int16),
+    "starts": ((), np.int16),
     "flags": (("parameter",), np.uint8),
     "status": ((), np.int8),
 }
@@ -71,6 +72,7 @@ class StandInFit:
             "standard_error": np.where(estimate > 0.9, np.nan, 0.1 * estimate),
             "chi2": (values**2).sum(0),
             "optima": np.where(np.isnan(mean), 0, 1 + (mean > 0.6)).astype(np.int16),
+            "starts": np.where(np.isnan(mean), 0, 1 + 63 * (spread > 0.2)).astype(np.int16),
             "flags": (estimate > 0.9).astype(np.uint8),
             "status": status,
         }
