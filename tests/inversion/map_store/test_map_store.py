@@ -143,6 +143,9 @@ def test_a_file_that_is_lost_or_cut_off_is_named_and_made_again(store, name, kee
     assert run_units(again).done == 1
     assert contents(store.path) == whole
     open_map(store.path).load()
+    shutil.rmtree(store.path / name)
+    with pytest.raises(DataError, match=f"the array '{name}' is missing, though zarr.json lists it"):
+        open_map(store.path)
 
 
 @pytest.mark.parametrize("full_at", [3, 9, 16])
