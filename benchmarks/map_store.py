@@ -3,8 +3,8 @@
     python benchmarks/map_store.py [--turns N] [--side PIXELS …]
 
 A unit of a map of six parameters, side × side pixels of random numbers, is written in four ways that take turns: as
-:mod:`pbrdf.inversion.map_store` does it, arrays with the parameters as an axis, the check of the settings before and the
-mark last; the same numbers as twelve variables, straight through zarr; and both through
+:mod:`pbrdf.inversion.map_store` does it, arrays with the parameters as an axis, the check of the settings before and
+the mark last; the same numbers as twelve variables, straight through zarr; and both through
 ``xarray.Dataset.to_zarr(region=…)``. Printed are medians and quartiles of the time of a unit, and ratios to the first.
 """
 
