@@ -149,6 +149,22 @@ def test_a_file_that_is_lost_or_cut_off_is_named_and_made_again(store, name, kee
         open_map(store.path)
 
 
+def test_a_store_that_lost_its_metadata_is_one_line(store):
+    for name, words in (("estimate", "estimate"), ("status", "status")):
+        file = store.path / name / "zarr.json"
+        content = file.read_bytes()
+        for kept in (None, b"{", b"{}"):
+            file.unlink() if kept is None else file.write_bytes(kept)
+            if name == "status" or kept:
+                with pytest.raises(DataError, match=rf"maps\.zarr.*({words}|damaged)"):
+                    open_map(store.path, partial=True)
+            with pytest.raises(
+                DataError, match=r"maps\.zarr.*(damaged|is missing, though zarr.json lists it)"
+            ):
+                run_units(store_at(store.path))
+            file.write_bytes(content)
+
+
 @pytest.mark.parametrize("full_at", [3, 9, 16])
 def test_a_full_disk_is_one_line_and_the_map_goes_on_when_there_is_room(tmp_path, monkeypatch, full_at):
     run_units(store_at(tmp_path / "alone.zarr"))
