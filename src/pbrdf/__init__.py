@@ -58,6 +58,7 @@ if TYPE_CHECKING:
     from pbrdf.inversion.bootstrap import bootstrap
     from pbrdf.inversion.contour import contour
     from pbrdf.inversion.identifiability import identifiability
+    from pbrdf.inversion.map_store import open_map
     from pbrdf.inversion.model_comparison import compare_models as compare
     from pbrdf.inversion.parameter_map import MapFit, fit_map
     from pbrdf.inversion.profile import profile
@@ -116,6 +117,7 @@ _HOME = {
     "Nuisance": "pbrdf.inversion",
     "HoldOut": "pbrdf.inversion",
     "load_fit": "pbrdf.inversion.stored_result",
+    "open_map": "pbrdf.inversion.map_store",
     # how far to trust a fit
     "profile": "pbrdf.inversion.profile",
     "contour": "pbrdf.inversion.contour",
@@ -209,6 +211,7 @@ __all__ = [
     "make_dataset",
     "merit",
     "open_experiment",
+    "open_map",
     "plan",
     "plausibility",
     "polarization",
