@@ -180,7 +180,9 @@ def _binned(pixels: _Pixels, width: float) -> _Pixels:
     if pixels.covariance is None:
         if small.all():
             return _Pixels(pixels.angles[:0], pixels.values[:0], None, pixels.series[:0])
-        pixels, number = _Pixels(*(a if a is None else a[~small] for a in pixels)), number[~small]
+        kept = ~small
+        pixels = _Pixels(pixels.angles[kept], pixels.values[kept], None, pixels.series[kept])
+        number = number[kept]
     else:
         # too few to say how values run on: each pixel by itself
         number = np.where(small, len(count) + np.arange(len(number)), number)
