@@ -80,5 +80,5 @@ def test_the_perspective_of_its_lens_turns_the_axes_little(pictures):
 @pytest.mark.slow
 def test_no_ball_and_no_cylinder_is_in_it(pictures):
     for kind in ("sphere", "cylinder"):
-        with pytest.raises(DataError, match="round outline|edges"):
+        with pytest.raises(DataError, match=r"round outline|edges"):
             parse_pixel_geometry(f"{kind}:light=10@0").located(pictures)
