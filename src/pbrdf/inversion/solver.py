@@ -255,13 +255,14 @@ def solve(
             tolerance,
             progress,
             single=True,
+            sums=search,
         )
         if search:
-            return rough
+            return rough.solution()
         # rounding makes lanes stall in single precision that stand at their minimum
-        near = np.isin(rough.status, [*_CONVERGED, Status.STALLED])
+        close = np.isin(rough.status, [*_CONVERGED, Status.STALLED])
         start = np.where(np.isfinite(rough.cost)[:, None], np.clip(rough.u.T, lower, upper), start)
-        damping, last = np.where(near, DAMPING_NEAR, DAMPING), np.where(near, LAST_STEP_NEAR, LAST_STEP)
+        damping, last = np.where(close, DAMPING_NEAR, DAMPING), np.where(close, LAST_STEP_NEAR, LAST_STEP)
         tried, progress = rough.iterations, None
     solution = _solve(
         residuals, start, lower, upper, damping, last, max_iterations, tolerance, progress
@@ -283,6 +284,7 @@ def _solve(
     progress: Callable[[int, int], None] | None,
     *,
     single: bool = False,
+    sums: bool = True,
 ) -> _Result:
     """:func:`solve` in one precision, from starts within the bounds; a first damping and last step of each."""
     import drjit as dr
@@ -290,7 +292,7 @@ def _solve(
     backend = get_backend()
     Float, UInt32 = backend.Float32 if single else backend.Float, backend.UInt32
     batch, size = start.shape
-    result = _Result(batch, size, sums=not single)
+    result = _Result(batch, size, sums=sums)
     # a batch of one would be compiled apart, as a broadcast: double it
     lanes = np.arange(batch, dtype=np.uint32) if batch > 1 else np.zeros(2, dtype=np.uint32)
     doubled = [values if batch > 1 else values[lanes] for values in (start, lower, upper, damping, last)]
@@ -485,7 +487,7 @@ _FIXED = ("low", "high", "last")
 
 
 class _Result:
-    """Collects lanes as they stop, an unknown or a sum a row, as Dr.Jit has them; of a search no sums."""
+    """Collects lanes as they stop, an unknown or a sum a row, as Dr.Jit has them; with or without the sums."""
 
     def __init__(self, batch: int, size: int, *, sums: bool) -> None:
         self._sums = sums
