@@ -27,7 +27,7 @@ from pbrdf.cli.convert import convert
 from pbrdf.cli.doctor import doctor
 from pbrdf.cli.export import export
 from pbrdf.cli.fit import fit
-from pbrdf.cli.interrupt import INTERRUPTED, end, heard_at_once
+from pbrdf.cli.interrupt import INTERRUPTED, end, heard_at_once, say_when_interrupted, what_is_said
 from pbrdf.cli.lists import models, paints
 from pbrdf.cli.measure import measure
 from pbrdf.cli.options import ReadingCommand
@@ -58,10 +58,11 @@ class _Commands(TyperGroup):
     def invoke(self, ctx: Any) -> Any:
         try:
             with _plugin_warnings_in_lines():
+                say_when_interrupted()
                 refuse_odd_numbers(self.commands, given_arguments())
                 return super().invoke(ctx)
         except KeyboardInterrupt:
-            fail("interrupted")
+            fail(what_is_said())
             raise typer.Exit(INTERRUPTED) from None
         except PbrdfError as error:
             fail(str(error))
@@ -179,5 +180,5 @@ def main() -> None:
         except Exception:
             if not heard.is_set():
                 raise
-            fail("interrupted")
+            fail(what_is_said())
             end()

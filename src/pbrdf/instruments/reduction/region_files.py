@@ -33,7 +33,7 @@ from pbrdf.files.text import read_toml
 from pbrdf.instruments.frames.pictures import SUFFIXES, open_pictures
 from pbrdf.instruments.reduction.regions import Ellipse, LabelRegion, Polygon, Rectangle, Region
 
-__all__ = ["read_regions", "region_from_text"]
+__all__ = ["read_labels", "read_regions", "region_from_text"]
 
 #: More values than this in a picture of labels are a photograph.
 _MOST_LABELS = 1000
@@ -102,7 +102,7 @@ def read_regions(path: str | Path) -> dict[str, Region]:
     elif kind in TABLE_EXTENSIONS:
         regions = _from_csv(path)
     elif kind in SUFFIXES:
-        labels = _labels(path)
+        labels = read_labels(path)
         values = np.unique(labels)
         if len(values) > _MOST_LABELS:
             raise DataError(f"{path}: {len(values)} different values are more than regions can have")
@@ -142,7 +142,7 @@ def _from_table(table: Any, folder: Path) -> Region:
     if keys == {"polygon"}:
         return _polygon(table["polygon"])
     if keys == {"labels", "value"} and type(table["value"]) is int:
-        return LabelRegion(_labels(folder / table["labels"]), table["value"])
+        return LabelRegion(read_labels(folder / table["labels"]), table["value"])
     raise ValueError
 
 
@@ -166,7 +166,14 @@ def _from_csv(path: Path) -> dict[str, Region]:
     return regions
 
 
-def _labels(path: Path) -> np.ndarray:
+def read_labels(path: Path) -> np.ndarray:
+    """A picture of whole numbers, shape (rows, columns).
+
+    Raises
+    ------
+    DataError
+        If it is another picture, or none.
+    """
     file = open_pictures(path)
     if file.count != 1 or file.dtype.kind not in "uib":
         raise DataError(f"{path}: a picture of labels is one picture of whole numbers")
