@@ -59,6 +59,7 @@ if TYPE_CHECKING:
     from pbrdf.inversion.contour import contour
     from pbrdf.inversion.identifiability import identifiability
     from pbrdf.inversion.model_comparison import compare_models as compare
+    from pbrdf.inversion.parameter_map import MapFit, fit_map
     from pbrdf.inversion.profile import profile
     from pbrdf.inversion.stored_result import load_fit
     from pbrdf.models import (
@@ -109,6 +110,8 @@ _HOME = {
     # fit
     "fit": "pbrdf.inversion",
     "FitResult": "pbrdf.inversion",
+    "fit_map": "pbrdf.inversion.parameter_map",
+    "MapFit": "pbrdf.inversion.parameter_map",
     "NoiseModel": "pbrdf.inversion",
     "Nuisance": "pbrdf.inversion",
     "HoldOut": "pbrdf.inversion",
@@ -165,6 +168,7 @@ __all__ = [
     "FitResult",
     "HoldOut",
     "Instrument",
+    "MapFit",
     "Model",
     "ModelError",
     "NoiseModel",
@@ -193,6 +197,7 @@ __all__ = [
     "dop",
     "error_analysis",
     "fit",
+    "fit_map",
     "get_backend",
     "goniometric_datasets",
     "identifiability",

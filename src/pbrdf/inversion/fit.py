@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
@@ -16,17 +15,17 @@ from pbrdf.errors import FitError
 from pbrdf.inversion.comparison import compare, near_specular_tilt
 from pbrdf.inversion.estimates import distinct_optima, estimates_at
 from pbrdf.inversion.holdout import HoldOut, Prediction, prediction_errors
-from pbrdf.inversion.noise import Noise, NoiseModel, parse_noise
+from pbrdf.inversion.noise import Noise, parse_noise
 from pbrdf.inversion.notes import notes_on
 from pbrdf.inversion.nuisance import Nuisance
-from pbrdf.inversion.observations import Observations
+from pbrdf.inversion.observations import Observations, noise_in_words
 from pbrdf.inversion.problem import Space
 from pbrdf.inversion.result import FitResult
-from pbrdf.inversion.solver import LOSSES, Solution
+from pbrdf.inversion.solver import Solution
 from pbrdf.inversion.starts import sobol_starts
 from pbrdf.inversion.statistics import goodness
 from pbrdf.inversion.strategy import STRATEGIES, joint, stepwise
-from pbrdf.inversion.unknowns import apply_starts, space_of, with_terms
+from pbrdf.inversion.unknowns import apply_starts, check_choices, space_of, with_terms
 from pbrdf.models import DoubleGauss, Model
 
 if TYPE_CHECKING:
@@ -34,7 +33,6 @@ if TYPE_CHECKING:
 
 __all__ = ["fit"]
 
-OBJECTIVES = ("stokes", "paper")
 #: Geometries among which are looked for as many different ones as there are parameters, before all are.
 _FEW = 1000
 
@@ -136,14 +134,9 @@ def fit(
         noise = parse_noise(noise)
     if isinstance(hold_out, str):
         hold_out = HoldOut.parse(hold_out)
-    if starts < 1:
-        raise FitError(f"starts={starts}: at least one start is needed")
     if strategy not in STRATEGIES:
         raise FitError(f"strategy={strategy!r}: choose one of {', '.join(STRATEGIES)}")
-    if loss not in LOSSES:
-        raise FitError(f"loss={loss!r}: choose one of {', '.join(LOSSES)}")
-    if objective not in OBJECTIVES:
-        raise FitError(f"objective={objective!r}: choose one of {', '.join(OBJECTIVES)}")
+    check_choices(starts, loss, objective)
     if covariance is None:
         observations = Observations.from_dataset(dataset, noise, objective)
     else:
@@ -187,7 +180,7 @@ def fit(
     seconds = time.perf_counter() - clock
     if not np.isfinite(solution.cost).any():
         raise FitError("no start gave finite residuals: check the data's values and the bounds")
-    words = _noise_in_words(noise, fitted_data)
+    words = noise_in_words(noise, fitted_data)
     if covariance is not None:
         words = "stated: the covariance of the components"
     result = _summarise(
@@ -281,17 +274,3 @@ def _summarise(
     )
     result.notes.extend(notes_on(result, dataset, fitted_data, solution, best))
     return result
-
-
-def _noise_in_words(noise: Noise | None, data: Observations) -> str:
-    if noise is not None:
-        return f"stated: {noise}"
-    if data.std_known:
-        kind = "standard uncertainties" if data.correlation is None else "covariances"
-        left_out = "" if data.unstated == 0 else f"; values without one are left out: {data.unstated}"
-        return f"{kind} of the data set{left_out}"
-    assumed = NoiseModel()
-    words = str(assumed)
-    if not {"I", "m00"} & set(data.channels):
-        words = f"{math.hypot(assumed.relative, assumed.absolute):.2g} for every ratio"
-    return f"assumed, as the data set states no (or not every) uncertainty: {words}"

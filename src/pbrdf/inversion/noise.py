@@ -29,14 +29,15 @@ class Noise(Protocol):
         channel
             ``I``, ``Q``, ``U``, ``V``, ``m00`` … ``m33``, or a ratio, ``dolp``, ``Q_over_I`` …, ``m01_over_m00`` …
         intensity
-            Intensity at the same geometries on the scale of a BRDF, shape (G,); NaN where it was not measured.
+            Intensity at the same geometries on the scale of a BRDF, shape (…, G), leading dimensions counting data
+            sets; NaN where it was not measured.
         scale
-            Factor that brought the data to that scale, shape (G,).
+            Factor that brought the data to that scale, of a shape that broadcasts to the same.
 
         Returns
         -------
         ndarray
-            On the scale of a BRDF, shape (G,).
+            On the scale of a BRDF, shape (…, G).
         """
 
 
@@ -99,8 +100,8 @@ class NoiseModel:
     def standard_uncertainty(self, channel: str, intensity: np.ndarray, scale: np.ndarray) -> np.ndarray:
         """See :class:`Noise`."""
         size = np.abs(intensity)
-        median = float(np.nanmedian(size)) if np.isfinite(size).any() else 1.0
-        floor = max(self.absolute * median, np.finfo(float).tiny)
+        median = _median(size)
+        floor = np.maximum(self.absolute * median, np.finfo(float).tiny)
         if is_ratio(channel):
             size = np.where(np.isfinite(size), size, median)
             return np.hypot(self.relative, floor / np.maximum(size, np.finfo(float).tiny))
@@ -174,12 +175,27 @@ class EqualNoise:
 
     def standard_uncertainty(self, channel: str, intensity: np.ndarray, scale: np.ndarray) -> np.ndarray:
         """See :class:`Noise`."""
-        size = np.abs(intensity[np.isfinite(intensity)])
-        typical = float(np.sqrt((size**2).mean())) if size.size else 1.0
-        return np.full(intensity.shape, 1.0 if is_ratio(channel) else max(typical, np.finfo(float).tiny))
+        if is_ratio(channel):
+            return np.ones(intensity.shape)
+        known = np.isfinite(intensity)
+        count = known.sum(axis=-1, keepdims=True)
+        squares = (np.where(known, intensity, 0.0) ** 2).sum(axis=-1, keepdims=True)
+        typical = np.where(count > 0, np.sqrt(squares / np.maximum(count, 1)), 1.0)
+        return np.broadcast_to(np.maximum(typical, np.finfo(float).tiny), intensity.shape).copy()
 
     def __str__(self) -> str:
         return "equal weights"
+
+
+def _median(values: np.ndarray) -> np.ndarray:
+    """Median of what is finite along the last axis, which is kept; 1 where nothing is."""
+    known = np.isfinite(values)
+    count = known.sum(axis=-1, keepdims=True)
+    ordered = np.sort(np.where(known, values, np.inf), axis=-1)
+    low, high = (
+        np.take_along_axis(ordered, np.maximum(place, 0), axis=-1) for place in ((count - 1) // 2, count // 2)
+    )
+    return np.where(count > 0, 0.5 * low + 0.5 * high, 1.0)
 
 
 def parse_noise(text: str) -> Noise:

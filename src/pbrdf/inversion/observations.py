@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from pbrdf.data.conventions import qu_from_dolp_aolp
 from pbrdf.data.covariance import correlations
-from pbrdf.data.schema import COVARIANCE, NORMALISED, is_ratio
-from pbrdf.data.select import measured_channels, to_brdf_scale
+from pbrdf.data.schema import COVARIANCE, NORMALISED, VARIABLES, is_ratio, std_name
 from pbrdf.errors import FitError
 from pbrdf.inversion.noise import Noise, NoiseModel
 from pbrdf.optics.stokes import STOKES
@@ -19,7 +20,7 @@ from pbrdf.optics.stokes import STOKES
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Observations"]
+__all__ = ["SINGULAR", "Measurements", "Observations", "measurements", "noise_in_words"]
 
 #: Correlation matrices whose smallest eigenvalue is no more than this are singular but for rounding.
 SINGULAR = 1e-12
@@ -95,85 +96,29 @@ class Observations:
         FitError
             If nothing was measured, or a covariance is singular.
         """
-        quantity = ds.attrs["quantity"]
-        scale = np.ones(ds.sizes["geometry"])
-        if quantity == "reflectance_factor":
-            scale /= np.pi
-        elif quantity not in ("brdf", NORMALISED):
-            scale /= np.cos(ds["theta_i"].values)
-        if quantity not in ("brdf", NORMALISED):
-            ds = to_brdf_scale(ds)
-        measured = measured_channels(ds)
-        if not measured:
-            raise FitError("the data set holds no measured value")
-        stated = {name: _std(ds, name) for name in measured}
-        columns: dict[str, np.ndarray] = {}
-        uncertainties: dict[str, np.ndarray] = {}
-        for name in measured:
-            if name.startswith("mueller"):
-                for i, j in np.ndindex(4, 4):
-                    element = name.replace("mueller", f"m{i}{j}")
-                    if element != "m00_over_m00":  # 1 says nothing
-                        columns[element] = ds[name].values[:, i, j]
-                        uncertainties[element] = stated[name][:, i, j]
-            elif name not in ("dolp", "aolp"):
-                columns[name], uncertainties[name] = ds[name].values, stated[name]
-        turned = None
-        if "dolp" in measured and "aolp" in measured:
-            columns["Q_over_I"], columns["U_over_I"] = qu_from_dolp_aolp(
-                1.0, ds["dolp"].values, ds["aolp"].values
-            )
-            uncertainties["Q_over_I"], uncertainties["U_over_I"], turned = _propagated(
-                ds["dolp"].values, ds["aolp"].values, stated["dolp"], stated["aolp"]
-            )
-        if "dolp" in measured:
-            # of light without a measured angle the degree still counts
-            angle = np.isfinite(ds["aolp"].values) if "aolp" in measured else np.zeros(len(scale), dtype=bool)
-            columns["dolp"] = np.where(angle, np.nan, ds["dolp"].values)
-            uncertainties["dolp"] = stated["dolp"]
-        intensity = columns.get("m00", columns.get("I", np.full(ds.sizes["geometry"], np.nan)))
-        model = noise or NoiseModel()
-        if objective == "paper":
-            columns, uncertainties = _intensity_and_dolp(columns)
-        known, unstated = True, 0
-        channels = tuple(name for name in columns if np.isfinite(columns[name]).any())
-        for name in channels:
-            given = np.isfinite(uncertainties[name]) & (noise is None or objective == "paper")
-            finite = np.isfinite(columns[name])
-            if noise is None and objective == "stokes" and (given & finite).any():
-                # a value without an uncertainty among others that have one is left out, not the others' uncertainties
-                if left_out := int((finite & ~given).sum()):
-                    columns[name] = np.where(given, columns[name], np.nan)
-                    unstated += left_out
-                continue
-            known &= objective == "stokes" and model.absolute_scale
-            guess = model.standard_uncertainty(name, intensity, scale)
-            uncertainties[name] = np.where(given, uncertainties[name], guess)
-        values = np.stack([columns[name] for name in channels])
-        std = np.stack([uncertainties[name] for name in channels])
-        absent = ~(np.isfinite(values) & np.isfinite(std))
-        values[absent], std[absent] = 0.0, np.inf
+        columns = {str(name): ds[name].values for name in ds.data_vars}
+        found = measurements(columns, ds["theta_i"].values, ds.attrs["quantity"], noise, objective)
         result = cls(
             theta_i=ds["theta_i"].values,
             theta_r=ds["theta_r"].values,
             phi=ds["phi"].values,
-            channels=channels,
-            values=values,
-            std=std,
+            channels=found.channels,
+            values=np.stack(found.values),
+            std=np.stack(found.std),
             illumination=tuple(float(v) for v in ds.attrs["illumination"]),  # type: ignore[arg-type]
-            std_known=known,
+            std_known=bool(found.std_known),
             group=ds["group"].values,
             wavelength=ds["wavelength"].values if "wavelength" in ds.coords else None,
-            scale=scale,
-            unstated=unstated,
+            scale=found.scale,
+            unstated=int(found.unstated),
         )
         if noise is not None or objective == "paper":
             return result
-        if turned is not None:
-            return result._with_turned(turned)
+        if found.turned is not None:
+            return result._with_turned(found.turned)
         if COVARIANCE not in ds.data_vars:
             return result
-        index = [STOKES.index(name) for name in channels]
+        index = [STOKES.index(name) for name in found.channels]
         correlation = correlations(ds[COVARIANCE].values)[:, index][:, :, index]
         if not np.tril(correlation, -1).any():
             return result
@@ -245,6 +190,14 @@ class Observations:
     def count(self) -> int:
         """Number of measured values."""
         return int(np.isfinite(self.std).sum())
+
+    @property
+    def typical_intensity(self) -> float:
+        """Median of what was measured of the intensity above 0; NaN where there is nothing."""
+        intensity = [self.values[c] for c, name in enumerate(self.channels) if name in ("I", "m00")]
+        positive = np.concatenate(intensity or [np.empty(0)])
+        positive = positive[positive > 0.0]
+        return float(np.median(positive)) if positive.size else math.nan
 
     def distinct(self, by_group: bool = False, by_wavelength: bool = False) -> tuple[int, int]:
         """Numbers of different geometries, and of different values of a model there: one for each measured channel.
@@ -319,10 +272,132 @@ class Observations:
         )._regular(message)
 
 
-def _std(ds: xr.Dataset, name: str) -> np.ndarray:
-    if f"{name}_std" in ds.data_vars:
-        return ds[f"{name}_std"].values
-    return np.full(ds[name].shape, np.nan)
+class Measurements(NamedTuple):
+    """What was measured, of one data set or of many at once: every array has the leading dimensions of the data.
+
+    Attributes
+    ----------
+    channels
+        See :class:`Observations`: those of which any data set holds a value.
+    values, std
+        For each channel, shape (…, G); not measured: 0 and infinite.
+    scale
+        Factor that brought the data to the scale of a BRDF, shape (…, G).
+    std_known, unstated
+        See :class:`Observations`, shape (…).
+    turned
+        Correlation of Q/I and U/I made of DoLP and AoLP, shape (…, G); None where there are none.
+    """
+
+    channels: tuple[str, ...]
+    values: list[np.ndarray]
+    std: list[np.ndarray]
+    scale: np.ndarray
+    std_known: np.ndarray
+    unstated: np.ndarray
+    turned: np.ndarray | None
+
+
+def measurements(
+    columns: Mapping[str, np.ndarray], theta_i: np.ndarray, quantity: str, noise: Noise | None, objective: str
+) -> Measurements:
+    """What was measured and how uncertain it is, on the scale of a BRDF.
+
+    Parameters
+    ----------
+    columns
+        The data variables of the schema by name, shape (…, G), Mueller matrices (…, G, 4, 4): leading dimensions count
+        data sets.
+    theta_i
+        Zenith angle of the source, radians; its shape broadcasts to (…, G).
+    quantity
+        What the values are, see :mod:`pbrdf.data.schema`.
+    noise, objective
+        See :meth:`Observations.from_dataset`.
+
+    Raises
+    ------
+    FitError
+        If nothing was measured.
+    """
+    divisor: np.ndarray | None = None
+    if quantity == "reflectance_factor":
+        divisor = np.array(np.pi)
+    elif quantity not in ("brdf", NORMALISED):
+        divisor = np.cos(theta_i)
+    scale = np.ones(theta_i.shape) if divisor is None else np.ones(theta_i.shape) / divisor
+
+    def on_scale(name: str, values: np.ndarray) -> np.ndarray:
+        if divisor is None or is_ratio(name):
+            return values
+        return values / (divisor[..., None, None] if name == "mueller" else divisor)
+
+    present = [n for n in VARIABLES if n in columns and not np.isnan(columns[n]).all()]
+    if not present:
+        raise FitError("the data set holds no measured value")
+    measured = {name: on_scale(name, columns[name]) for name in present}
+    stated = {
+        name: on_scale(name, columns[std_name(name)])
+        if std_name(name) in columns
+        else np.full(columns[name].shape, np.nan)
+        for name in present
+    }
+    values: dict[str, np.ndarray] = {}
+    std: dict[str, np.ndarray] = {}
+    for name in present:
+        if name.startswith("mueller"):
+            for i, j in np.ndindex(4, 4):
+                element = name.replace("mueller", f"m{i}{j}")
+                if element != "m00_over_m00":  # 1 says nothing
+                    values[element] = measured[name][..., i, j]
+                    std[element] = stated[name][..., i, j]
+        elif name not in ("dolp", "aolp"):
+            values[name], std[name] = measured[name], stated[name]
+    turned = None
+    if "dolp" in present and "aolp" in present:
+        values["Q_over_I"], values["U_over_I"] = qu_from_dolp_aolp(1.0, measured["dolp"], measured["aolp"])
+        std["Q_over_I"], std["U_over_I"], turned = _propagated(
+            measured["dolp"], measured["aolp"], stated["dolp"], stated["aolp"]
+        )
+    if "dolp" in present:
+        # of light without a measured angle the degree still counts
+        angle = np.isfinite(measured["aolp"]) if "aolp" in present else False
+        values["dolp"] = np.where(angle, np.nan, measured["dolp"])
+        std["dolp"] = stated["dolp"]
+    any_of_them = next(iter(values.values()))
+    intensity = values.get("m00", values.get("I", np.full(any_of_them.shape, np.nan)))
+    model = noise or NoiseModel()
+    if objective == "paper":
+        values, std = _intensity_and_dolp(values)
+    known = np.ones(any_of_them.shape[:-1], dtype=bool)
+    unstated = np.zeros(any_of_them.shape[:-1], dtype=int)
+    finite = {name: np.isfinite(v) for name, v in values.items()}
+    channels = tuple(name for name in values if finite[name].any())
+    for name in channels:
+        given = np.isfinite(std[name]) & (noise is None or objective == "paper")
+        if noise is None and objective == "stokes":
+            usable = given & finite[name]
+            some = usable.any(axis=-1)
+            if some.all() and usable.sum() == finite[name].sum():
+                continue
+            # a value without an uncertainty among others that have one is left out, not the others' uncertainties
+            left_out = finite[name] & ~given & some[..., None]
+            unstated = unstated + left_out.sum(axis=-1)
+            values[name] = np.where(left_out, np.nan, values[name])
+            some = some | ~finite[name].any(axis=-1)
+            if some.all():
+                continue
+            known &= some | model.absolute_scale
+        else:
+            known &= objective == "stokes" and model.absolute_scale
+        std[name] = np.where(given, std[name], model.standard_uncertainty(name, intensity, scale))
+    for name in channels:
+        absent = ~(np.isfinite(values[name]) & np.isfinite(std[name]))
+        if absent.any():
+            values[name] = np.where(absent, 0.0, values[name])
+            std[name] = np.where(absent, np.inf, std[name])
+    chosen, uncertain = [values[name] for name in channels], [std[name] for name in channels]
+    return Measurements(channels, chosen, uncertain, scale, known, unstated, turned)
 
 
 def _intensity_and_dolp(
@@ -344,7 +419,13 @@ def _intensity_and_dolp(
             dolp = np.hypot(columns["Q"], columns.get("U", np.zeros(1))) / columns["I"]
         dolp = np.where(columns["I"] > 0.0, dolp, np.nan)
     pair = {"I": columns["I"], "dolp": dolp}
-    return pair, {name: np.full(len(v), np.sqrt(np.nanmean(v**2))) for name, v in pair.items()}
+    with np.errstate(invalid="ignore", divide="ignore"):
+        squares = {name: np.isfinite(v) * np.nan_to_num(v) ** 2 for name, v in pair.items()}
+        sizes = {
+            name: np.sqrt(square.sum(axis=-1) / np.isfinite(pair[name]).sum(axis=-1))
+            for name, square in squares.items()
+        }
+    return pair, {name: np.broadcast_to(sizes[name][..., None], v.shape) for name, v in pair.items()}
 
 
 def _propagated(
@@ -364,3 +445,18 @@ def _propagated(
     with np.errstate(invalid="ignore"):
         correlation = (along - across) * c * s / (s_q * s_u)
     return s_q, s_u, np.nan_to_num(correlation)
+
+
+def noise_in_words(noise: Noise | None, data: Observations) -> str:
+    """Where the standard uncertainties of fitted data come from."""
+    if noise is not None:
+        return f"stated: {noise}"
+    if data.std_known:
+        kind = "standard uncertainties" if data.correlation is None else "covariances"
+        left_out = "" if data.unstated == 0 else f"; values without one are left out: {data.unstated}"
+        return f"{kind} of the data set{left_out}"
+    assumed = NoiseModel()
+    words = str(assumed)
+    if not {"I", "m00"} & set(data.channels):
+        words = f"{math.hypot(assumed.relative, assumed.absolute):.2g} for every ratio"
+    return f"assumed, as the data set states no (or not every) uncertainty: {words}"

@@ -16,6 +16,7 @@ from pbrdf.inversion.blocks import Blocks, Key
 from pbrdf.inversion.forward import channel_values, measured_mueller
 from pbrdf.inversion.observations import Observations
 from pbrdf.inversion.solver import Residuals, linearise
+from pbrdf.inversion.stack import Stack
 from pbrdf.models.base import Model
 from pbrdf.models.parameters import Parameter
 
@@ -169,8 +170,8 @@ class Space:
 
 def residuals(
     space: Space,
-    data: Sequence[Observations],
-    starts: int = 1,
+    data: Sequence[Observations] | Stack,
+    starts: int | np.ndarray = 1,
     accuracy: str | None = None,
     *,
     single: bool = False,
@@ -180,7 +181,7 @@ def residuals(
     Where the errors of the channels are correlated, the residuals are W (model − measured) with WᵀW the inverse
     covariance, see :attr:`Observations.whitening`: the sum of their squares is the χ² of all channels together.
 
-    Lane number l belongs to data set l // starts; every lane runs over all geometries of its data set.
+    Every lane runs over all geometries of its data set.
 
     Parameters
     ----------
@@ -190,7 +191,8 @@ def residuals(
         Data sets with the same channels, number of geometries and illumination; angles may differ, groups and
         wavelengths may not.
     starts
-        Number of lanes for each data set.
+        Number of lanes for each data set, lane l belonging to data set l // starts; or the number of the data set of
+        each lane, shape (B,).
     accuracy
         Accuracy of the model, if not that of the space's options.
     single
@@ -203,34 +205,28 @@ def residuals(
     """
     import drjit as dr
 
-    first = data[0]
-    for other in data[1:]:
-        if other.channels != first.channels or other.values.shape != first.values.shape:
-            raise FitError("data sets fitted together must have the same channels and number of geometries")
-        if other.illumination != first.illumination:
-            raise FitError("data sets fitted together must have the same illumination")
+    stack = data if isinstance(data, Stack) else Stack.of(data)
     backend = get_backend()
     Float, UInt32 = backend.Float32 if single else backend.Float, backend.UInt32
-    points = first.values.shape[1]
-    signals = _Signals(space.of_a_block, data, accuracy, Float)
-    factors = None
-    if any(o.correlation is not None for o in data):
-        size = len(first.channels)
-        factors = {
-            (i, j): backend.upload(Float, np.concatenate([o.whitening[i, j] for o in data]))
-            for i in range(size)
-            for j in range(i + 1)
-        }
-    channels = range(len(first.channels))
-    measured = [backend.upload(Float, np.concatenate([o.values[c] for o in data])) for c in channels]
-    weights = [backend.upload(Float, np.concatenate([1.0 / o.std[c] for o in data])) for c in channels]
-    divisor = dr.opaque(UInt32, starts)
-    stride = dr.opaque(UInt32, points)
+    points, channels = stack.points, stack.channels
+    signals = _Signals(space.of_a_block, stack, accuracy, Float)
+    measured = stack.upload("values", Float)
+    stride = dr.opaque(UInt32, len(stack))
+    factors = weights = None
+    if stack.whitening is not None:
+        factors = dict(zip(stack.whitening, stack.upload("whitening", Float), strict=True))
+    else:
+        weights = stack.upload("weights", Float)
+    divisor = owner = None
+    if isinstance(starts, int):
+        divisor = dr.opaque(UInt32, starts)
+    else:
+        owner = backend.upload(UInt32, starts)
 
     def function(u: list[Any], lane: Any, point: Any) -> tuple[list[Any], Any]:
-        number = lane // divisor
-        modelled, alive = signals(u, number, point, first.channels)
-        at = number * stride + point
+        number = lane // divisor if owner is None else dr.gather(UInt32, owner, lane)
+        modelled, alive = signals(u, number, point, channels)
+        at = point * stride + number
         if factors is not None:
             differences = [m - dr.gather(Float, y, at) for m, y in zip(modelled, measured, strict=True)]
             correlated: list[Any] = []
@@ -247,11 +243,11 @@ def residuals(
         return weighted, alive
 
     # grazing geometries take more work: side by side with their like
-    order = np.argsort(np.maximum(first.theta_i, first.theta_r), kind="stable").astype(np.uint32)
+    order = np.argsort(np.maximum(stack.theta_i, stack.theta_r)[:, 0], kind="stable").astype(np.uint32)
     if space.blocks is None:
-        rough: Any = None if single else partial(residuals, space, data, starts, accuracy, single=True)
+        rough: Any = None if single else partial(residuals, space, stack, starts, accuracy, single=True)
         return Residuals(function, points, _penalty(space), space.loss, order, rough)
-    place = space.blocks.places(getattr(first, space.blocks.split))
+    place = space.blocks.places(getattr(stack, space.blocks.split))
     blocks = len(space.blocks.labels)
     if (place == blocks).any():
         raise FitError(f"data of a {space.blocks.split} without parameters of its own cannot be fitted")
@@ -295,7 +291,7 @@ def predict(
     else:
         counting, _ = _at_points(space, np.asarray(unknowns, dtype=float)[None], data)
         u = [backend.upload(backend.Float, column) for column in counting[0].T]
-    signals = _Signals(space.of_a_block, [data], None, backend.Float)
+    signals = _Signals(space.of_a_block, Stack.of([data]), None, backend.Float)
     values, _ = signals(u, dr.zeros(backend.UInt32, size), point, channels)
     arrays = [backend.Float(v) + dr.zeros(backend.Float, size) for v in values]
     dr.eval(arrays)
@@ -330,7 +326,7 @@ def derivatives(
     backend = get_backend()
     UInt32 = backend.UInt32
     count = dr.opaque(UInt32, size)
-    signals = _Signals(space.of_a_block, [data], None, backend.Float)
+    signals = _Signals(space.of_a_block, Stack.of([data]), None, backend.Float)
     counting, place = _at_points(space, unknowns, data)
 
     def function(u: list[Any], lane: Any, point: Any) -> tuple[list[Any], Any]:
@@ -357,41 +353,32 @@ def _at_points(space: Space, unknowns: np.ndarray, data: Observations) -> tuple[
 class _Signals:
     """Channels modelled at one point of one data set, over Dr.Jit floats."""
 
-    def __init__(self, space: Space, data: Sequence[Observations], accuracy: str | None, Float: Any) -> None:
+    def __init__(self, space: Space, stack: Stack, accuracy: str | None, Float: Any) -> None:
         import drjit as dr
 
         backend = get_backend()
         self.Float, self.UInt32 = Float, backend.UInt32
-        self.space, self.incident = space, data[0].illumination
+        self.space, self.incident = space, stack.illumination
         model = space.build(space.lower)  # only its kernel and options are used
         self.model = model if accuracy is None else model.with_accuracy(accuracy)
         self.fixed = {name: dr.opaque(self.Float, value) for name, value in space.fixed.items()}
         self.absent = [p.name for p in model.parameters if p.vanishing and space.fixed.get(p.name) == 0.0]
-        first = data[0]
-        size = len(first.theta_i)
-        names = ("theta_i", "theta_r", "phi")
-
-        def is_first(o: Observations, name: str) -> bool:
-            own, other = getattr(o, name), getattr(first, name)
-            return own is other or np.array_equal(own, other)
-
-        same = all(is_first(o, name) for o in data[1:] for name in names)
-        self.stride = dr.opaque(self.UInt32, 0 if same else size)
-
-        def upload(column: str) -> Any:
-            arrays = [getattr(o, column) for o in (data[:1] if same else data)]
-            return backend.upload(self.Float, np.concatenate(arrays))
-
-        self.angles = [upload(name) for name in names]
+        # arrays over the geometries and data sets: where these share them, one number for all
+        widths = [1 if getattr(stack, n).shape[1] == 1 else len(stack) for n in ("theta_i", "theta_r", "phi")]
+        self.strides = [dr.opaque(self.UInt32, width) for width in widths]
+        self.steps = [dr.opaque(self.UInt32, int(width > 1)) for width in widths]
+        self.angles = [stack.upload(name, self.Float)[0] for name in ("theta_i", "theta_r", "phi")]
         nuisances = {term.role for term in space.terms if term.nuisance}
-        if "angle" in nuisances and any((np.abs(np.sin(o.phi)) > 1e-6).any() for o in data):
+        if "angle" in nuisances and (np.abs(np.sin(stack.phi)) > 1e-6).any():
             raise FitError("nuisance angle: it needs data in the plane of incidence (phi 0° or 180°)")
         self.scale = None
         if "dark" in nuisances:
-            scale = np.ones(size) if first.scale is None else first.scale
-            self.scale = backend.upload(self.Float, scale)
+            scale = np.ones((stack.points, 1)) if stack.scale is None else stack.scale
+            self.scale = backend.upload(self.Float, scale.ravel())
+            self.scale_stride = dr.opaque(self.UInt32, scale.shape[1])
+            self.scale_step = dr.opaque(self.UInt32, int(scale.shape[1] > 1))
         self.label_index = {
-            split: backend.upload(self.UInt32, _label_index(first, split, labels))
+            split: backend.upload(self.UInt32, _label_index(stack, split, labels))
             for split in ("group", "wavelength")
             if (labels := space.labels(split))
         }
@@ -422,12 +409,15 @@ class _Signals:
                 target = nuisances if term.nuisance else values
                 target[term.role] = dr.select(chosen, value, target[term.role])
         values |= dict.fromkeys(self.absent)
-        at = number * self.stride + point
-        theta_i, theta_r, phi = (dr.gather(self.Float, a, at) for a in self.angles)
+        theta_i, theta_r, phi = (
+            dr.gather(self.Float, angle, point * stride + number * step)
+            for angle, stride, step in zip(self.angles, self.strides, self.steps, strict=True)
+        )
         f, alive = measured_mueller(self.model, values, nuisances, theta_i, theta_r, phi)
         dark = None
         if "dark" in nuisances:
-            dark = nuisances["dark"] * dr.gather(self.Float, self.scale, point)
+            at = point * self.scale_stride + number * self.scale_step
+            dark = nuisances["dark"] * dr.gather(self.Float, self.scale, at)
         return channel_values(f, channels, self.incident, nuisances.get("gain"), dark), (alive, f)
 
 
@@ -440,11 +430,11 @@ def _value(p: Parameter, unknown: Any) -> Any:
     return dr.sqrt(unknown + _POINT * _POINT) if p.even else unknown
 
 
-def _label_index(data: Observations, split: str, labels: list[Any]) -> np.ndarray:
+def _label_index(stack: Stack, split: str, labels: list[Any]) -> np.ndarray:
     """Position of each geometry's label among those that have unknowns of their own, or their number."""
-    index = np.full(len(data.theta_i), len(labels), dtype=np.uint32)
+    index = np.full(stack.points, len(labels), dtype=np.uint32)
     for position, label in enumerate(labels):
-        index[getattr(data, split) == label] = position
+        index[getattr(stack, split) == label] = position
     return index
 
 

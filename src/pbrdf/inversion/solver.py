@@ -30,7 +30,7 @@ import numpy as np
 
 from pbrdf.backend import get_backend
 
-__all__ = ["LOSSES", "Residuals", "Solution", "Status", "linearise", "solve"]
+__all__ = ["LOSSES", "Residuals", "Solution", "Status", "costs", "linearise", "solve"]
 
 #: Iterations of one kernel launch, after which stopped lanes leave the batch. A batch of at most SMALL_BATCH
 #: lanes runs for as many as make LAUNCH evaluations: recording the kernel anew would take longer than idle lanes do.
@@ -202,6 +202,8 @@ def solve(
     max_iterations: int = 100,
     tolerance: float = 1e-10,
     progress: Callable[[int, int], None] | None = None,
+    search: bool = False,
+    near: bool = False,
 ) -> Solution:
     """Minimise ½ Σ r² for every lane within bounds.
 
@@ -221,6 +223,10 @@ def solve(
         reduction of the cost over ``tolerance`` falls below ``tolerance``.
     progress
         Called after each iteration with the number of stopped lanes and of all lanes.
+    search
+        Whether to stop where single precision does, whatever the size of the batch.
+    near
+        Whether the starts are near the minimum: then there is little damping, and no search in single precision.
 
     Returns
     -------
@@ -229,9 +235,11 @@ def solve(
     """
     lower, upper = (np.broadcast_to(np.asarray(b, dtype=float), start.shape) for b in (lower, upper))
     start = np.clip(start, lower, upper)
-    damping, last = (np.full(len(start), value) for value in (DAMPING, LAST_STEP))
+    damping = np.full(len(start), DAMPING_NEAR if near else DAMPING)
+    last = np.full(len(start), LAST_STEP_NEAR if near else LAST_STEP)
     tried = np.zeros(len(start), dtype=int)
-    if residuals.single is not None and len(start) * residuals.points >= WORTH_SINGLE:
+    large = len(start) * residuals.points >= WORTH_SINGLE
+    if residuals.single is not None and (search or (large and not near)):
         rough = _solve(
             residuals.single(),
             start,
@@ -244,6 +252,8 @@ def solve(
             progress,
             single=True,
         )
+        if search:
+            return rough
         # rounding makes lanes stall in single precision that stand at their minimum
         near = rough.converged | (rough.status == Status.STALLED)
         start = np.where(np.isfinite(rough.cost)[:, None], np.clip(rough.u, lower, upper), start)
@@ -301,6 +311,51 @@ def _solve(
     if len(lanes):
         result.store(lanes, np.arange(len(lanes)), state, state.status.numpy())
     return result.solution()
+
+
+def costs(residuals: Residuals, u: np.ndarray) -> np.ndarray:
+    """½ Σ ρ(r²) of every lane over its points, penalties left out, in single precision where there are such residuals.
+
+    Parameters
+    ----------
+    residuals
+        The problem.
+    u
+        Unknowns, shape (B, P).
+
+    Returns
+    -------
+    ndarray
+        Shape (B,).
+    """
+    import drjit as dr
+
+    backend = get_backend()
+    single = residuals.single is not None
+    used = residuals.single() if residuals.single is not None else residuals
+    Float, UInt32 = backend.Float32 if single else backend.Float, backend.UInt32
+    batch = len(u)
+    # a batch of one would be compiled apart
+    lanes = np.arange(batch, dtype=np.uint32) if batch > 1 else np.zeros(2, dtype=np.uint32)
+    columns = [backend.upload(Float, column) for column in u[lanes].T]
+    lane = backend.upload(UInt32, lanes)
+    end = dr.opaque(UInt32, used.points)
+
+    def body(point: Any, total: Any) -> tuple[Any, Any]:
+        values, _ = used.function(columns, lane, point)
+        for r in values:
+            total = total + 0.5 * LOSSES[used.loss](Float(r) * r)[0]
+        return point + 1, total
+
+    with dr.suspend_grad():
+        total = dr.while_loop(
+            (dr.zeros(UInt32, len(lanes)), dr.zeros(Float, len(lanes))),
+            lambda point, total: point < end,
+            body,
+            mode="symbolic",
+            label="costs",
+        )[1]
+    return np.asarray(total.numpy()[:batch], dtype=float)
 
 
 def linearise(function: Function, u: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:

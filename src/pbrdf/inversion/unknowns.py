@@ -8,16 +8,31 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from pbrdf.data.schema import is_ratio
 from pbrdf.errors import FitError
 from pbrdf.inversion.nuisance import KINDS, Nuisance, check_prior
 from pbrdf.inversion.observations import Observations
 from pbrdf.inversion.problem import Space, Term
+from pbrdf.inversion.solver import LOSSES
+from pbrdf.inversion.stack import Stack
 from pbrdf.models import Model, find_model
 from pbrdf.models.parameters import Parameter
 
-__all__ = ["apply_starts", "space_of", "with_terms"]
+__all__ = ["OBJECTIVES", "apply_starts", "bounds_of_each", "check_choices", "space_of", "with_terms"]
+
+OBJECTIVES = ("stokes", "paper")
+
+
+def check_choices(starts: int, loss: str, objective: str) -> None:
+    """Check options of a fit that are one of a few; raises FitError."""
+    if starts < 1:
+        raise FitError(f"starts={starts}: at least one start is needed")
+    if loss not in LOSSES:
+        raise FitError(f"loss={loss!r}: choose one of {', '.join(LOSSES)}")
+    if objective not in OBJECTIVES:
+        raise FitError(f"objective={objective!r}: choose one of {', '.join(OBJECTIVES)}")
 
 
 def space_of(
@@ -91,16 +106,58 @@ def _bounds(
         if p.logarithmic and low <= 0.0:
             raise FitError(f"bounds: {p.name} must be above 0, got {low:g}")
         return low, high
-    if p.amplitude:
-        # an amplitude is on the data's own scale: π times a typical value is its order of magnitude
-        measured = [data.values[c] for c, n in enumerate(data.channels) if n in ("I", "m00")]
-        if not measured:  # ratios set an amplitude against the facets, whose scale is absolute
-            return cls.fit_bounds(p, options)
-        intensity = np.concatenate(measured)
-        positive = intensity[intensity > 0.0]
-        scale = math.pi * float(np.median(positive)) if positive.size else 1.0
-        return max(1e-3 * scale, p.domain[0]), min(1e3 * scale, p.domain[1])
+    if p.amplitude and _holds_intensity(
+        data.channels
+    ):  # ratios set it against the facets, whose scale is absolute
+        return tuple(map(float, _amplitude_bounds(p, data.typical_intensity)))  # type: ignore[return-value]
     return cls.fit_bounds(p, options)
+
+
+def _holds_intensity(channels: Sequence[str]) -> bool:
+    return not {"I", "m00"}.isdisjoint(channels)
+
+
+def _amplitude_bounds(p: Parameter, typical: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
+    """An amplitude is on the data's own scale: π times a typical value is its order of magnitude."""
+    scale = np.where(np.isfinite(typical), math.pi * np.asarray(typical), 1.0)
+    return np.maximum(1e-3 * scale, p.domain[0]), np.minimum(1e3 * scale, p.domain[1])
+
+
+def _nuisance_bounds(kind: str, typical: ArrayLike, scale: ArrayLike) -> tuple[Any, Any]:
+    """Bounds of a nuisance term; ``scale`` is the typical factor that brought the data to the scale of a BRDF."""
+    known = np.where(np.isfinite(typical), typical, 1.0)
+    if kind == "dark":
+        return -known / scale, known / scale
+    if kind == "gain":
+        return 0.01 * math.pi * known, 100.0 * math.pi * known
+    return KINDS[kind].lower, KINDS[kind].upper
+
+
+def bounds_of_each(
+    space: Space, stack: Stack, given: Mapping[str, tuple[float, float]]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Bounds of the free parameters of each of many data sets, shape (B, P): some follow from the data.
+
+    Parameters
+    ----------
+    space
+        Made by :func:`with_terms` from data of the same form.
+    stack
+        The data sets.
+    given
+        Bounds that the user stated, which no data change.
+    """
+    lower, upper = (np.tile(of, (len(stack), 1)) for of in (space.lower, space.upper))
+    typical = stack.typical_intensity()
+    scale = 1.0 if stack.scale is None else np.median(stack.scale, axis=0)
+    with_gain = any(term.nuisance and term.role == "gain" for term in space.terms)
+    follows = _holds_intensity(stack.channels) and not with_gain
+    for i, (term, p) in enumerate(zip(space.terms, space.free, strict=True)):
+        if term.nuisance:
+            lower[:, i], upper[:, i] = _nuisance_bounds(term.role, typical, scale)
+        elif p.amplitude and follows and term.role not in given:
+            lower[:, i], upper[:, i] = _amplitude_bounds(p, typical)
+    return lower, upper
 
 
 def with_terms(
@@ -126,9 +183,6 @@ def with_terms(
     with_gain = any(n.kind == "gain" for n in given_terms)
     if with_gain and all(map(is_ratio, data.channels)):
         raise FitError("nuisance gain: only ratios were measured, which no gain changes; leave it out")
-    intensity = [data.values[c] for c, n in enumerate(data.channels) if n in ("I", "m00")]
-    positive = np.concatenate(intensity or [np.ones(1)])
-    typical = float(np.median(positive[positive > 0.0])) if (positive > 0.0).any() else 1.0
 
     def add(p: Parameter, low: float, high: float, term: Term) -> None:
         name = p.name if term.split is None else f"{p.name}[{_label_text(term.label)}]"
@@ -147,12 +201,8 @@ def with_terms(
             add(p, low, high, Term(p.name, split.get(p.name), label, prior))
     for nuisance in given_terms:
         p = KINDS[nuisance.kind]
-        low, high = p.lower, p.upper
-        if nuisance.kind == "dark":
-            raw = typical / (float(np.median(data.scale)) if data.scale is not None else 1.0)
-            low, high = -raw, raw
-        elif nuisance.kind == "gain":
-            low, high = 0.01 * math.pi * typical, 100.0 * math.pi * typical
+        scale = 1.0 if data.scale is None else float(np.median(data.scale))
+        low, high = map(float, _nuisance_bounds(nuisance.kind, data.typical_intensity, scale))
         if any(t.nuisance and t.role == nuisance.kind for t in terms):
             raise FitError(f"nuisance {nuisance.kind} is given twice")
         if any(p.name == nuisance.kind for p in space.model.parameters):
@@ -185,19 +235,27 @@ def _label_text(label: Any) -> str:
 
 
 def apply_starts(
-    first: np.ndarray, space: Space, begin: Mapping[str, float], start: Mapping[str, float]
+    first: np.ndarray,
+    space: Space,
+    begin: Mapping[str, float],
+    start: Mapping[str, float],
+    bounds: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> None:
-    """Put starting values of the user and of the nuisance terms into the drawn ones, in place."""
+    """Put starting values of the user and of the nuisance terms into the drawn ones, (…, S, P), in place.
+
+    ``bounds`` are those of each data set, shape (…, P), where they are not those of the space.
+    """
     values = space.to_parameters(first)
+    lower, upper = (space.lower, space.upper) if bounds is None else bounds
     for i, term in enumerate(space.terms):
         role = term.role
         if not term.nuisance:
             if role in begin:
-                values[0, i] = min(max(begin[role], space.lower[i]), space.upper[i])
+                values[..., 0, i] = np.clip(begin[role], lower[..., i], upper[..., i])
             if role in start:
-                values[:, i] = start[role]
+                values[..., i] = start[role]
         elif role != "gain":
             # not 0 for the source: its effect is even in the radius, the derivative would vanish
             default = 0.2 * space.upper[i] if role == "source" else KINDS[role].default
-            values[:, i] = term.prior[0] if term.prior else default
+            values[..., i] = term.prior[0] if term.prior else default
     first[:] = space.to_unknowns(values)

@@ -1,0 +1,96 @@
+"""Standard errors, correlations and flags of the pixels of a block, by the definitions of a single fit."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from pbrdf.inversion.parameter_map.layout import FLAGS
+from pbrdf.inversion.solver import BOUND_MARGIN
+from pbrdf.inversion.statistics import covariance, prior_spread
+
+__all__ = ["Spread", "spread_of"]
+
+#: Where the inverse of a matrix of unit diagonal has no larger elements than this, rounding is of no account.
+WELL_CONDITIONED = 1e10
+
+
+class Spread(NamedTuple):
+    """How uncertain B sets of P unknowns are.
+
+    Attributes
+    ----------
+    error
+        Standard errors of the unknowns, shape (B, P); NaN on a bound.
+    covariance
+        Shape (B, P, P), 0 in the rows and columns of unknowns on a bound.
+    flags
+        Bits of :data:`~pbrdf.inversion.parameter_map.layout.FLAGS`, shape (B, P).
+    """
+
+    error: np.ndarray
+    covariance: np.ndarray
+    flags: np.ndarray
+
+
+def spread_of(
+    u: np.ndarray, information: np.ndarray, low: np.ndarray, high: np.ndarray, scale: np.ndarray
+) -> Spread:
+    """What :func:`~pbrdf.inversion.estimates.estimates_at` says of one fit, of many.
+
+    Parameters
+    ----------
+    u, information
+        Unknowns at the optimum and JᵀJ there, shapes (B, P) and (B, P, P).
+    low, high
+        Bounds of the unknowns, shape (B, P).
+    scale
+        What the covariance is multiplied with, shape (B,): the reduced χ² where the uncertainties' scale is a guess.
+    """
+    margin = BOUND_MARGIN * (high - low)
+    at_low, at_high = u <= low + margin, u >= high - margin
+    inside = ~(at_low | at_high)
+    prior = prior_spread(low, high)
+    found = _inverse(information, inside, prior) * scale[:, None, None]
+    with np.errstate(invalid="ignore"):
+        error = np.sqrt(np.einsum("bpp->bp", found))
+    error = np.where(inside, error, np.nan)
+    with np.errstate(invalid="ignore"):
+        undetermined = error >= prior
+    flags = (
+        at_low * np.uint8(FLAGS["at_lower_bound"])
+        + at_high * np.uint8(FLAGS["at_upper_bound"])
+        + undetermined * np.uint8(FLAGS["undetermined"])
+    )
+    return Spread(error, found, flags.astype(np.uint8))
+
+
+def _inverse(information: np.ndarray, inside: np.ndarray, prior: np.ndarray) -> np.ndarray:
+    """Covariances of the unknowns inside their bounds, 0 for the others."""
+    size = information.shape[-1]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        unit = np.where(inside, 1.0 / np.sqrt(np.einsum("bpp->bp", information)), 0.0)
+    usable = np.isfinite(unit).all(axis=1) & np.isfinite(information).all(axis=(1, 2))
+    unit = np.where(usable[:, None], unit, 0.0)
+    matrices = np.where(usable[:, None, None], information, 0.0)
+    matrices *= unit[:, :, None] * unit[:, None, :]
+    # to each a unit diagonal; rows of unknowns on a bound become those of the unit matrix
+    matrices[:, range(size), range(size)] = 1.0
+    usable &= _positive(matrices)
+    matrices[~usable] = np.eye(size)
+    inverse = np.linalg.inv(matrices)
+    usable &= np.abs(inverse).max(axis=(1, 2), initial=0.0) < WELL_CONDITIONED
+    inverse *= unit[:, :, None] * unit[:, None, :]
+    for b in np.flatnonzero(~usable):
+        inverse[b] = 0.0
+        kept = np.flatnonzero(inside[b])
+        if len(kept) and np.isfinite(information[b]).all():
+            inverse[np.ix_([b], kept, kept)] = covariance(information[b][np.ix_(kept, kept)], prior[b, kept])
+    return inverse
+
+
+def _positive(matrices: np.ndarray) -> np.ndarray:
+    """Which matrices of unit diagonal are far enough from singular to be inverted."""
+    sign, size = np.linalg.slogdet(matrices)
+    return (sign > 0.0) & (size > -80.0)
