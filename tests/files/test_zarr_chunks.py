@@ -59,16 +59,118 @@ def test_a_chunk_that_is_cut_off_is_named(tmp_path, ds, options):
 
 def test_a_missing_array_is_named_where_the_folder_lists_it(tmp_path, ds):
     write(ds, tmp_path / "data.zarr")
-    shutil.rmtree(tmp_path / "data.zarr" / "Q")
-    with pytest.raises(DataError, match=r"data\.zarr: the array 'Q' is missing, though \.zmetadata lists it"):
-        read(tmp_path / "data.zarr")
-    path = tmp_path / "third.zarr"
-    with pytest.warns(Warning, match=r"."):
-        ds.to_zarr(path, zarr_format=3, consolidated=True, write_empty_chunks=True)
+    stored(ds, tmp_path / "second.zarr", **VERSIONS[0])
+    for name, words in (("data", r"zarr\.json"), ("second", r"\.zmetadata")):
+        path = tmp_path / f"{name}.zarr"
+        shutil.rmtree(path / "Q")
+        with pytest.raises(
+            DataError, match=rf"{name}\.zarr: the array 'Q' is missing, though {words} lists it"
+        ):
+            read(path)
+
+
+@pytest.fixture
+def sharded(tmp_path):
+    """7 x 9 numbers in shards of 4 x 6 with chunks of 2 x 3: the last ones reach beyond the array."""
+    numbers = np.random.default_rng(1).normal(size=(7, 9))
+    ds = xr.Dataset({"I": (("y", "x"), numbers)})
+
+    def made(**encoding):
+        encoding = {"shards": (4, 6), "chunks": (2, 3)} | encoding
+        path = stored(ds, tmp_path / "s.zarr", zarr_format=3, consolidated=False, encoding={"I": encoding})
+        assert sorted(file.name for file in (path / "I" / "c").rglob("*") if file.is_file()) == list("0011")
+        return path
+
+    return made
+
+
+@pytest.mark.parametrize("codecs", [{}, {"compressors": None}, {"compressors": "blosc"}])
+def test_a_shard_that_is_missing_cut_off_or_lacks_a_chunk_is_named(sharded, codecs):
+    if codecs.get("compressors") == "blosc":
+        from zarr.codecs import BloscCodec
+
+        codecs = {"compressors": BloscCodec(cname="lz4")}
+    path = sharded(**codecs)
+    shard = path / "I" / "c" / "1" / "0"
+    content = shard.read_bytes()
+    index = len(content) - 16 * 4 - 4
+    for keep in range(len(content)):
+        shard.write_bytes(content[:keep])
+        with pytest.raises(DataError, match=r"s\.zarr: the chunk I/c/1/0 .*(cut off|lacks|damaged)"):
+            require_complete(path)
+    for place, words in ((0, "lacks 1 of the 4"), (3, "lacks 1 of the 4")):
+        holed = bytearray(content)
+        holed[index + 16 * place : index + 16 * (place + 1)] = b"\xff" * 16
+        shard.write_bytes(holed)
+        with pytest.raises(DataError, match=rf"I/c/1/0 {words}"):
+            require_complete(path)
+    for at, value in ((0, 2**40), (8, 2**40), (8, 2**64 - 2), (8, 0)):
+        holed = bytearray(content)
+        holed[index + at : index + at + 8] = value.to_bytes(8, "little")
+        shard.write_bytes(holed)
+        if value or "compressors" in codecs:
+            with pytest.raises(DataError, match=r"I/c/1/0 .*damaged"):
+                require_complete(path)
+    shard.unlink()
+    with pytest.raises(DataError, match=r"the chunk I/c/1/0 is missing \(4 are needed\)"):
+        require_complete(path)
+
+
+def test_a_shard_with_its_index_first_and_one_whose_index_cannot_be_read(sharded):
+    from zarr.codecs import ShardingCodec
+
+    codec = ShardingCodec(chunk_shape=(2, 3), index_location="start")
+    path = sharded(chunks=(4, 6), shards=None, serializer=codec, compressors=None, filters=None)
+    shard = path / "I" / "c" / "0" / "1"
+    content = shard.read_bytes()
+    for keep in (len(content) - 1, 67, 0):
+        shard.write_bytes(content[:keep])
+        with pytest.raises(DataError, match=r"I/c/0/1 .*cut off"):
+            require_complete(path)
+    shard.write_bytes(content)
+    file = path / "I" / "zarr.json"
+    described = json.loads(file.read_text(encoding="utf-8"))
+    configuration = described["codecs"][0]["configuration"]
+    configuration["index_codecs"].append({"name": "gzip"})
+    file.write_text(json.dumps(described), encoding="utf-8")
     require_complete(path)
-    shutil.rmtree(path / "Q")
-    with pytest.raises(DataError, match=r"third\.zarr: the array 'Q' is missing, though zarr\.json lists it"):
-        read(path)
+    configuration["chunk_shape"] = [3, 3]
+    file.write_text(json.dumps(described), encoding="utf-8")
+    with pytest.raises(DataError, match=r"chunks \[3, 3\] of a shard of the shape \[4, 6\]"):
+        require_complete(path)
+
+
+@pytest.mark.parametrize("numbers", ["noise", "constant", "few"])
+def test_every_cut_of_a_zstandard_file_is_found(tmp_path, numbers):
+    values = {
+        "noise": np.random.default_rng(2).normal(size=40_000),
+        "constant": np.full(100_000, 1.5),
+        "few": np.arange(3.0),
+    }[numbers]
+    from zarr.codecs import ZstdCodec
+
+    for codec in (ZstdCodec(level=0), ZstdCodec(level=3, checksum=True)):
+        path = stored(
+            xr.Dataset({"I": ("y", values)}),
+            tmp_path / "z.zarr",
+            zarr_format=3,
+            consolidated=False,
+            encoding={"I": {"compressors": codec, "chunks": values.shape}},
+        )
+        chunk = path / "I" / "c" / "0"
+        content = chunk.read_bytes()
+        step = max(len(content) // 50, 1)
+        for keep in [*range(min(len(content), 40)), *range(40, len(content), step), len(content) - 1]:
+            chunk.write_bytes(content[:keep])
+            with pytest.raises(DataError, match=r"the chunk I/c/0 .*cut off"):
+                require_complete(path)
+        for other, words in (
+            (content + b"\0", "is damaged"),
+            (b"\0" + content[1:], "does not begin as Zstandard"),
+        ):
+            chunk.write_bytes(other)
+            with pytest.raises(DataError, match=words):
+                require_complete(path)
 
 
 def test_what_this_package_writes_holds_chunks_of_nothing_but_the_fill_value(tmp_path):
@@ -78,7 +180,7 @@ def test_what_this_package_writes_holds_chunks_of_nothing_but_the_fill_value(tmp
 
 
 def test_declared_sizes_are_compared_with_the_folder(tmp_path, ds):
-    write(ds, tmp_path / "data.zarr")
+    stored(ds, tmp_path / "data.zarr", **VERSIONS[0])
     file = tmp_path / "data.zarr" / "I" / ".zarray"
     described = json.loads(file.read_text(encoding="utf-8"))
     for change, words in (
@@ -103,16 +205,35 @@ def test_declared_sizes_are_compared_with_the_folder(tmp_path, ds):
         read(tmp_path / "data.zarr")
 
 
+def test_declared_sizes_of_the_third_version_are_compared_with_the_folder(tmp_path, ds):
+    write(ds, tmp_path / "data.zarr")
+    file = tmp_path / "data.zarr" / "I" / "zarr.json"
+    described = json.loads(file.read_text(encoding="utf-8"))
+    grid = {"name": "regular", "configuration": {"chunk_shape": [10**12]}}
+    for change, words in (
+        ({"shape": [10**12], "chunk_grid": grid}, "holds 48 bytes where 8000000000000 are needed"),
+        ({"shape": [10**12]}, "the chunk I/c/1 is missing"),
+        ({"shape": [6, 6]}, "not the description of an array .chunks .6. of an array of the shape .6, 6."),
+        ({"codecs": []}, "not the description of an array"),
+    ):
+        file.write_text(json.dumps(described | change), encoding="utf-8")
+        with pytest.raises(DataError, match=words):
+            read(tmp_path / "data.zarr")
+
+
 def test_frames_that_lost_a_chunk_are_refused(tmp_path):
     from pbrdf.instruments.frames.frame_grids import open_grid
 
     frames = xr.Dataset({"frames": (("state", "y", "x"), np.arange(48, dtype=np.uint16).reshape(2, 4, 6))})
     path = tmp_path / "frames.zarr"
-    stored(frames, path, zarr_format=2, encoding={"frames": {"chunks": (1, 4, 6)}})
-    assert open_grid(path, ("a", "b")).read(0, 0, 4).shape == (2, 4, 6)
-    (path / "frames" / "1.0.0").unlink()
-    with pytest.raises(DataError, match=r"frames\.zarr: the chunk frames/1\.0\.0 is missing"):
-        open_grid(path, ("a", "b"))
+    encoding = {"frames": {"chunks": (1, 4, 6)}}
+    for options, chunk in zip(VERSIONS, ("1.0.0", "c/1/0/0"), strict=True):
+        stored(frames, path, encoding=encoding, **options)
+        assert open_grid(path, ("a", "b")).read(0, 0, 4).shape == (2, 4, 6)
+        (path / "frames" / chunk).unlink()
+        with pytest.raises(DataError, match=rf"frames\.zarr: the chunk frames/{chunk} is missing"):
+            open_grid(path, ("a", "b"))
+        shutil.rmtree(path)
 
 
 def test_a_folder_without_rights_or_of_another_kind_is_no_traceback(tmp_path):

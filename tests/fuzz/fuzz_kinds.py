@@ -21,6 +21,7 @@ from fuzz_seeds import READER_SEEDS, write_tables, write_workbook, write_workboo
 
 import pbrdf
 from pbrdf.data import readers
+from pbrdf.data.formats.zarr_folder import create_zarr
 from pbrdf.errors import PbrdfError, PluginWarning
 
 __all__ = ["Kind", "kinds", "write_seeds"]
@@ -143,6 +144,8 @@ def write_seeds(folder: Path, *, fit: bool = True) -> None:
     frames = xr.Dataset({"frames": (("state", "y", "x"), np.stack([picture] * 2))}, {"state": ["a", "b"]})
     frames.to_netcdf(folder / "frames.nc", engine="h5netcdf")
     frames.to_zarr(folder / "frames.zarr", zarr_format=2, consolidated=True, write_empty_chunks=True)
+    sharded = {"frames": {"shards": frames["frames"].shape, "chunks": (1, *frames["frames"].shape[1:])}}
+    create_zarr(frames, folder / "frames_3.zarr", encoding=sharded)
     _write_measurements(folder)
     for suffix in (".xlsx", ".ods"):
         write_workbook(folder / f"book{suffix}")
@@ -269,7 +272,7 @@ def kinds(folder: Path) -> list[Kind]:
         ("model", ("model.json",), pbrdf.load_model),
         ("fit", ("fit.nc",), pbrdf.load_fit),
         ("picture", ("picture.png", "picture.tif", "picture.npy"), picture),
-        ("frames", ("frames.nc", "frames.zarr"), frames),
+        ("frames", ("frames.nc", "frames.zarr", "frames_3.zarr"), frames),
         ("raw frames", ("raw_frames",), measurement),
         ("colour mosaic", ("color_frames",), measurement),
         ("rendered picture", ("stokes.exr", "colors.exr"), rendered),

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import json
 import sys
 
 import numpy as np
@@ -37,13 +38,18 @@ def test_read_and_write_know_the_extension_and_others_read_it(tmp_path, ds):
         assert stored["theta_i"].attrs["units"] == "degree"
 
 
-def test_the_third_version_of_the_format_is_read(tmp_path):
-    numbered = make_dataset(0.1, 0.25, 0.0, quantity="brdf", I=1.0)
-    version = pytest.importorskip("zarr").__version__
-    if int(version.partition(".")[0]) < 3:
-        pytest.skip(f"zarr {version} does not write the third version of the format")
-    numbered.to_zarr(tmp_path / "data.zarr", zarr_format=3, consolidated=False, write_empty_chunks=True)
-    assert read(tmp_path / "data.zarr").identical(numbered)
+def test_the_third_version_of_the_format_is_written_with_text_that_has_a_type_there(tmp_path, ds):
+    write(ds, tmp_path / "data.zarr")
+    listed = json.loads((tmp_path / "data.zarr" / "zarr.json").read_text(encoding="utf-8"))
+    assert listed["zarr_format"] == 3
+    arrays = listed["consolidated_metadata"]["metadata"]
+    assert {*arrays} == {"theta_i", "theta_r", "phi", "group", "I"}
+    assert arrays["group"]["data_type"] == "string"
+
+
+def test_the_second_version_of_the_format_is_read(tmp_path, ds):
+    ds.to_zarr(tmp_path / "data.zarr", zarr_format=2, consolidated=True, write_empty_chunks=True)
+    assert read(tmp_path / "data.zarr").identical(ds)
 
 
 def test_a_zarr_folder_is_replaced_and_nothing_else_is(tmp_path, ds):
@@ -103,6 +109,12 @@ def test_without_zarr_the_remedy_is_named(tmp_path, ds, monkeypatch):
     for use in (lambda: write(ds, tmp_path / "new.zarr"), lambda: read(tmp_path / "data.zarr")):
         with pytest.raises(DataError, match=r"needs the package zarr: pip install zarr, or use \.nc"):
             use()
+
+
+def test_an_old_zarr_is_named_with_the_remedy(tmp_path, ds, monkeypatch):
+    monkeypatch.setattr("importlib.metadata.version", lambda name: "2.18.7")
+    with pytest.raises(DataError, match=r"needs zarr 3\.1\.3 or newer, not 2\.18\.7: pip install -U zarr"):
+        write(ds, tmp_path / "new.zarr")
 
 
 def test_a_folder_of_another_kind_is_no_file(tmp_path):

@@ -7,6 +7,7 @@ import pytest
 import xarray as xr
 
 from pbrdf.data.formats.csv_table.columns import COVARIANCES
+from pbrdf.data.formats.zarr_folder import open_zarr
 from pbrdf.errors import DataError
 from pbrdf.instruments.frames.frames import ArrayFrames
 from pbrdf.instruments.goniometer.angle_table import AngleTable
@@ -26,7 +27,11 @@ def written(path, polarimeter, frames, **options):
     instrument = Instrument(polarimeter, DETECTOR, reference_angle=np.deg2rad(20.0))
     reduce(frames, instrument, [MapWriter(path, frames, instrument, **options)], max_memory=1_000_000)
     if path.suffix == ".zarr":
-        return xr.open_dataset(path, engine="zarr", consolidated=False).load()
+        listed = json.loads((path / "zarr.json").read_text(encoding="utf-8"))
+        assert listed["zarr_format"] == 3
+        with open_zarr(path) as file:
+            assert {*file.variables} == {*listed["consolidated_metadata"]["metadata"]}
+            return file.load()
     return xr.open_dataset(path, engine="h5netcdf").load()
 
 

@@ -22,7 +22,7 @@ import numpy as np
 import xarray as xr
 
 from pbrdf.data.formats.csv_table.columns import COVARIANCES
-from pbrdf.data.formats.zarr_folder import require_zarr
+from pbrdf.data.formats.zarr_folder import create_zarr, list_arrays, require_zarr
 from pbrdf.errors import DataError
 from pbrdf.files.netcdf_files import PatientFile, write_netcdf_file
 from pbrdf.instruments.frames.frames import Frames
@@ -150,12 +150,11 @@ class MapWriter:
         else:
             import zarr
 
-            # a chunk of nothing but bad pixels is written as well: one that is not there was lost
-            self._head.to_zarr(
-                self._path, mode="w-", zarr_format=2, consolidated=False, write_empty_chunks=True
-            )
-            self._file = zarr.open_group(self._path, mode="r+", zarr_format=2)
+            create_zarr(self._head, self._path)
+            self._file = zarr.open_group(self._path, mode="r+", zarr_format=3, use_consolidated=False)
         self._variables = {name: self._variable(name) for name in self.names}
+        if self._kind == ".zarr":
+            list_arrays(self._path)
         self._buffers = {name: np.empty(self._chunk_shape[1:], _type(name)) for name in self.names}
         if self._kind == ".nc":
             # the file is complete but for its numbers, and h5py writes small parts of them faster
@@ -175,15 +174,16 @@ class MapWriter:
         if self._kind == ".nc":
             variable = self._file.create_variable(name, dims, dtype, chunks=self._chunk_shape, fillvalue=fill)
         else:
+            # a chunk of nothing but bad pixels is written as well: one that is not there was lost
             variable = self._file.create_array(
                 name,
                 shape=self._shape,
                 chunks=self._chunk_shape,
                 dtype=dtype,
                 fill_value=fill,
+                dimension_names=dims,
                 config={"write_empty_chunks": True},
             )
-            attributes = {**attributes, "_ARRAY_DIMENSIONS": list(dims)}
         for key, value in attributes.items():
             variable.attrs[key] = value
         return variable
