@@ -81,7 +81,10 @@ def map_pixels(
     bounds: Bounds = None,
     start: Start = None,
     starts: Annotated[
-        int, typer.Option(help="Starts of the pixels of a coarse grid; the others begin at their neighbours.", min=1)
+        int,
+        typer.Option(
+            help="Starts of the pixels of a coarse grid; the others begin at their neighbours.", min=1
+        ),
     ] = 64,
     iterations: Iterations = 100,
     noise: FitNoise = None,
@@ -91,7 +94,10 @@ def map_pixels(
     loss: Loss = "linear",
     share: Annotated[
         list[str] | None,
-        typer.Option(help="A parameter that all pixels, or all of a label, have in common (repeatable).", metavar="NAME"),
+        typer.Option(
+            help="A parameter that all pixels, or all of a label, have in common (repeatable).",
+            metavar="NAME",
+        ),
     ] = None,
     labels: Annotated[
         Path | None,
@@ -106,12 +112,15 @@ def map_pixels(
     counts_per_brdf: Annotated[
         float | None,
         typer.Option(
-            help="Digital numbers for a BRDF times cos θ_i of 1/sr, if known: the values are then BRDFs.", metavar="DN"
+            help="Digital numbers for a BRDF times cos θ_i of 1/sr, if known: the values are then BRDFs.",
+            metavar="DN",
         ),
     ] = None,
     polarimeter: Annotated[
         str | None,
-        polarimeter_option("STOKES are raw frames of this instrument: reduce them first, as `pbrdf reduce` does."),
+        polarimeter_option(
+            "STOKES are raw frames of this instrument: reduce them first, as `pbrdf reduce` does."
+        ),
     ] = None,
     angles: Annotated[
         Path | None,
@@ -213,7 +222,9 @@ def map_pixels(
         if quiet:
             print(target)
         return
-    _report(target, report, stokes, {"model": model, **arguments, "geometry": geometry}, formats, figures, quiet)
+    _report(
+        target, report, stokes, {"model": model, **arguments, "geometry": geometry}, formats, figures, quiet
+    )
 
 
 def _check_output(target: Path, place: tuple[int, int] | None, scheduler: str | None) -> None:
@@ -224,10 +235,14 @@ def _check_output(target: Path, place: tuple[int, int] | None, scheduler: str | 
         raise PbrdfError(f"--output {target}: a map is a store (.zarr), or a file (.nc) if it is small")
     require_folder_of(target)
     if place is not None and scheduler is not None:
-        raise PbrdfError("--worker needs no scheduler, and the workers of --scheduler no number: give one of the two")
+        raise PbrdfError(
+            "--worker needs no scheduler, and the workers of --scheduler no number: give one of the two"
+        )
     if target.suffix == ".nc":
         if place is not None or scheduler is not None:
-            raise PbrdfError(f"--output {target}: several workers fill a store: choose a name that ends in .zarr")
+            raise PbrdfError(
+                f"--output {target}: several workers fill a store: choose a name that ends in .zarr"
+            )
     else:
         require_zarr(target)
 
@@ -321,9 +336,7 @@ def _fill(
     state = [0, 0]
 
     def interrupted() -> str:
-        return (
-            f"interrupted; {state[0]} of {state[1]} units are kept in {target}: the same command goes on from there"
-        )
+        return f"interrupted; {state[0]} of {state[1]} units are kept in {target}: the same command goes on from there"
 
     say_when_interrupted(interrupted)
     with stage_bar(quiet, "Fitting units of pixels") as show:
@@ -339,7 +352,9 @@ def _fill(
             work = run_units(store, worker=place, progress=progress)
     say_when_interrupted()
     if work.left and not quiet:
-        warn(f"{target}: {work.left} units are left to other workers; the one that ends last draws the figures")
+        warn(
+            f"{target}: {work.left} units are left to other workers; the one that ends last draws the figures"
+        )
     return not work.left
 
 

@@ -9,7 +9,7 @@ import xarray as xr
 
 import pbrdf
 
-STATES = ("converged", "not_converged", "too_few_values", "failed", "not_measured")
+STATES = ("converged", "not_converged", "too_few_values", "failed", "not_measured", "masked")
 
 
 def example_map(shape=(40, 60), parameters=6, dims=("y", "x"), seed=0, freedom=120, cause=True):
@@ -36,6 +36,7 @@ def example_map(shape=(40, 60), parameters=6, dims=("y", "x"), seed=0, freedom=1
         status[draw < 0.01] = 1
         status[(draw > 0.01) & (draw < 0.015)] = 3
         status[along[0] + along[-1] > 1.7] = 4
+        status[along[0] + along[-1] > 1.9] = 5
         flags[0][along[-1] < 0.1] = 1
         flags[-1][rng.random(shape) < 0.05] = 4
     nothing = status >= 2
@@ -50,7 +51,8 @@ def example_map(shape=(40, 60), parameters=6, dims=("y", "x"), seed=0, freedom=1
             "chi2": (dims, chi2),
             "degrees_of_freedom": (dims, np.full(shape, freedom, dtype=np.int32)),
             "optima": (dims, optima),
-            "status": (dims, status, {"flag_values": list(range(5)), "flag_meanings": " ".join(STATES)}),
+            "starts": (dims, np.where(np.arange(chi2.size).reshape(shape) % 3 == 0, 64, 1).astype(np.int16)),
+            "status": (dims, status, {"flag_values": list(range(6)), "flag_meanings": " ".join(STATES)}),
             "flags": (
                 ("parameter", *dims),
                 flags,

@@ -102,7 +102,7 @@ def test_states_are_named_with_their_shares():
     figure = quality_figure(ShownMap(example_map((40, 40))), "paint")
     ax = next(ax for ax in figure.axes if ax.get_title() == "state of the fit")
     names = [text.get_text().partition("\n")[0] for text in ax.get_legend().get_texts()]
-    assert names == ["converged", "not converged", "failed", "not measured"]
+    assert names == ["converged", "not converged", "failed", "not measured", "masked"]
 
 
 def test_a_map_with_one_dimension_is_a_line_with_a_band():

@@ -26,7 +26,9 @@ def test_medians_shares_and_counts():
     assert p.standard_error == np.median(found["standard_error"].values[0][good])
     assert p.at_bounds == (found["flags"].values[0][good] == 1).mean()
     assert summary.parameters[-1].undetermined == (found["flags"].values[-1][good] == 4).mean()
-    assert summary.several_optima == (found["optima"].values[good] > 1).mean()
+    many = good & (found["starts"].values > 1)
+    assert summary.several_optima == (found["optima"].values[many] > 1).mean()
+    assert summary.searched == many.sum() / good.sum()
     assert sum(summary.states.values()) == summary.total == 3000
     assert summary.fitted == good.sum()
     assert summary.measured == (found["status"].values < 4).sum()

@@ -90,7 +90,9 @@ def pixels_from_stored(stored: xr.Dataset, path: Path) -> xr.Dataset:
         If a unit is not understood.
     """
     found = _understood(stored, path)
-    own = {name: c for name, c in stored.coords.items() if set(c.dims) <= {name} and name not in found.variables}
+    own = {
+        name: c for name, c in stored.coords.items() if set(c.dims) <= {name} and name not in found.variables
+    }
     kept = {name: stored[name] for name in (_MASK,) if name in stored.data_vars}
     return found.assign_coords(own).assign(kept)
 

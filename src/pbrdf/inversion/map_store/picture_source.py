@@ -95,15 +95,21 @@ class PictureSource:
                     "flat:theta_i=30,theta_r=40,phi=0"
                 )
             if len(geometry) not in (1, len(paths)):
-                raise DataError(f"{len(geometry)} geometries for {len(paths)} files: give one, or one for each")
+                raise DataError(
+                    f"{len(geometry)} geometries for {len(paths)} files: give one, or one for each"
+                )
             each = list(geometry) * (len(paths) // len(geometry))
             located = tuple(g.located(one) for g, one in zip(each, opened, strict=True))
         elif geometry:
-            raise DataError(f"{paths[0]}: holds data with the angles of every pixel: a geometry is one too many")
+            raise DataError(
+                f"{paths[0]}: holds data with the angles of every pixel: a geometry is one too many"
+            )
         found = [_pixel_sizes(path, one) for path, one in zip(paths, opened, strict=True)]
         for path, sizes in zip(paths, found, strict=True):
             if sizes != found[0]:
-                raise DataError(f"{path}: has {_in_words(sizes)} pixels, {paths[0]} has {_in_words(found[0])}")
+                raise DataError(
+                    f"{path}: has {_in_words(sizes)} pixels, {paths[0]} has {_in_words(found[0])}"
+                )
         shape = tuple(found[0].get(dim, 0) for dim in ("y", "x"))
         if labels is not None and labels.shape != shape:
             raise DataError(
@@ -215,7 +221,9 @@ def _in_words(sizes: Mapping[str, int]) -> str:
 
 def _together(parts: Sequence[xr.Dataset], sizes: Mapping[str, int]) -> xr.Dataset:
     """Geometries of several files one after the other; a coordinate along pixels is the first's."""
-    shared = {name for part in parts for name in COORDINATES if name in part and set(sizes) & set(part[name].dims)}
+    shared = {
+        name for part in parts for name in COORDINATES if name in part and set(sizes) & set(part[name].dims)
+    }
     spread = []
     for part in parts:
         # angles that one file has for every pixel, and another for all of them
@@ -224,7 +232,13 @@ def _together(parts: Sequence[xr.Dataset], sizes: Mapping[str, int]) -> xr.Datas
                 part = part.assign_coords({name: part[name].expand_dims(_sizes_here(part, sizes))})
         spread.append(part)
     return xr.concat(
-        spread, DIMENSION, data_vars="minimal", coords="minimal", compat="override", join="override", combine_attrs="override"
+        spread,
+        DIMENSION,
+        data_vars="minimal",
+        coords="minimal",
+        compat="override",
+        join="override",
+        combine_attrs="override",
     )
 
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pbrdf.report.numbers import brief, per_cent
-from pbrdf.report.parameter_map.shown_map import GOOD, NOT_MEASURED, PENDING, ShownMap
+from pbrdf.report.parameter_map.shown_map import GOOD, PENDING, WITHOUT, ShownMap
 from pbrdf.report.picture_grid import FLATTEST, STEEPEST, Margins, beside, picture_grid
 from pbrdf.report.style import BLUE, GREY, RED, styled
 
@@ -35,7 +35,7 @@ _STATES = {
     "not_converged": "#E69F00",
     "too_few_values": "#CC79A7",
     "failed": _NO_RESULT,
-    NOT_MEASURED: _MASKED,
+    **dict.fromkeys(WITHOUT, _MASKED),
     PENDING: _PENDING,
 }
 _OTHER_STATES = ("#009E73", "#000000")
@@ -392,7 +392,7 @@ def _draw_states(ax: Axes, shown: ShownMap) -> None:
         where = shown.status == k
         if not where.any():
             continue
-        hatched = name == NOT_MEASURED
+        hatched = name in WITHOUT
         handles.append(
             Patch(
                 facecolor=colours[k],

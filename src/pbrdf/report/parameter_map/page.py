@@ -103,7 +103,7 @@ def _trust(summary: MapSummary) -> Iterator[Markup]:
         ("χ²", [f"per degree of freedom: median {brief(summary.reduced_chi2, 3)}"]),
         (
             "Optima",
-            [f"more than one was seen at {per_cent(summary.several_optima)} of the pixels with a result"],
+            [summary.optima_in_words()],
         ),
     ]
     if summary.noise:

@@ -23,14 +23,15 @@ if TYPE_CHECKING:
 
     from pbrdf.models.parameters import Parameter
 
-__all__ = ["GOOD", "NOT_MEASURED", "PENDING", "Label", "ShownMap", "Window", "labels_of"]
+__all__ = ["GOOD", "PENDING", "WITHOUT", "Label", "ShownMap", "Window", "labels_of"]
 
 #: Pixels along a side of a picture, at most.
 MOST_PIXELS = 480
 #: Points along a line, at most.
 _MOST_POINTS = 4000
-#: Names of the states of a pixel that are looked for; the map itself says which number means which.
-GOOD, NOT_MEASURED = "converged", "not_measured"
+#: Names of the states of a pixel with a result, and of those that there was nothing to fit to; the map says which
+#: number means which.
+GOOD, WITHOUT = "converged", ("not_measured", "masked")
 #: What a pixel is that no worker has come to.
 PENDING = "pending"
 #: Dimensions that are no pixels.
@@ -202,7 +203,7 @@ class ShownMap:
         Which pixels.
     estimate, standard_error, flags
         Shape (parameters, \\*shape), in shown units; flags as the map has them.
-    reduced_chi2, degrees_of_freedom, optima
+    reduced_chi2, degrees_of_freedom, optima, starts
         Shape of the window; NaN and 0 where there is none.
     status
         Shape of the window: place in `states`.
@@ -229,7 +230,7 @@ class ShownMap:
         self.flags = np.zeros((len(self.labels), *shape), dtype=np.uint8)
         self.reduced_chi2 = np.full(shape, np.nan)
         self.degrees_of_freedom = np.zeros(shape, dtype=np.int32)
-        self.optima = np.zeros(shape, dtype=np.int16)
+        self.optima, self.starts = np.zeros(shape, dtype=np.int16), np.zeros(shape, dtype=np.int16)
         self.status = np.full(shape, len(self.states) - 1, dtype=np.int8)
         self.coordinates = {d: _coordinate(dataset, d, step) for d, step in self._steps()}
         if not empty:
@@ -263,9 +264,9 @@ class ShownMap:
         self.estimate[:, *place] = factors * read("estimate")
         self.standard_error[:, *place] = factors * read("standard_error")
         self.flags[:, *place] = np.nan_to_num(read("flags")).astype(np.uint8)
-        freedom, optima = (np.nan_to_num(read(n)).astype(int) for n in ("degrees_of_freedom", "optima"))
-        freedom, optima = np.maximum(freedom, 0), np.maximum(optima, 0)
-        self.degrees_of_freedom[place], self.optima[place] = freedom, optima
+        freedom = np.nan_to_num(read("degrees_of_freedom"))
+        self.degrees_of_freedom[place] = freedom
+        self.optima[place], self.starts[place] = (np.nan_to_num(read(n)) for n in ("optima", "starts"))
         self.reduced_chi2[place] = read("chi2") / np.where(freedom > 0, freedom, np.nan)
         codes = read("status")
         # where a fill value is no known state, nobody has been there yet
@@ -295,7 +296,12 @@ class ShownMap:
     @property
     def masked(self) -> np.ndarray:
         """Pixels that were not measured, or left out."""
-        return self.state(NOT_MEASURED)
+        return np.logical_or.reduce([self.state(name) for name in WITHOUT])
+
+    @property
+    def searched(self) -> np.ndarray:
+        """Pixels with a result that were searched from many starts, not from their neighbours alone."""
+        return self.good & (self.starts > 1)
 
     def flagged(self, *names: str) -> np.ndarray:
         """Which parameters of which pixels with a result have one of these flags."""

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pbrdf.report.numbers import brief, per_cent, with_error
-from pbrdf.report.parameter_map.shown_map import GOOD, NOT_MEASURED, PENDING, Label, ShownMap
+from pbrdf.report.parameter_map.shown_map import GOOD, PENDING, WITHOUT, Label, ShownMap
 from pbrdf.report.printing import plain_table, print_parts
 
 if TYPE_CHECKING:
@@ -66,8 +66,9 @@ class MapSummary:
         Numbers of pixels by state, all pixels of the map.
     parameters
         Their spread over the shown pixels.
-    several_optima
-        Share of the shown pixels with a result that saw more than one optimum.
+    searched, several_optima
+        Share of the shown pixels with a result that were searched from many starts, and of these the share that have
+        more than one optimum; NaN if there are none.
     reduced_chi2
         Its median; NaN if there is none.
     shown, total
@@ -78,6 +79,7 @@ class MapSummary:
 
     states: Mapping[str, int]
     parameters: tuple[ParameterSummary, ...]
+    searched: float
     several_optima: float
     reduced_chi2: float
     shown: int
@@ -94,7 +96,10 @@ class MapSummary:
         return cls(
             states=count_states(dataset, shown),
             parameters=tuple(_of_parameter(shown, k) for k in range(len(shown.labels))),
-            several_optima=float((shown.optima[good] > 1).sum() / count),
+            searched=float(shown.searched.sum() / count),
+            several_optima=float((shown.optima[shown.searched] > 1).mean())
+            if shown.searched.any()
+            else math.nan,
             reduced_chi2=float(np.median(reduced)) if reduced.size else math.nan,
             shown=shown.status.size,
             total=dataset["status"].size,
@@ -105,7 +110,7 @@ class MapSummary:
     @property
     def measured(self) -> int:
         """Pixels that there was something to fit to."""
-        return self.total - self.states.get(NOT_MEASURED, 0) - self.states.get(PENDING, 0)
+        return self.total - sum(self.states.get(name, 0) for name in (*WITHOUT, PENDING))
 
     @property
     def fitted(self) -> int:
@@ -141,19 +146,28 @@ class MapSummary:
         others = [
             f"{name.replace('_', ' ')} {counted(count)}"
             for name, count in self.states.items()
-            if count and name not in (GOOD, NOT_MEASURED, PENDING)
+            if count and name not in (GOOD, *WITHOUT, PENDING)
         ]
         if others:
             lines.append(f"Without a result: {', '.join(others)}.")
         if self.states.get(PENDING):
             lines.append(f"Not yet fitted: {counted(self.states[PENDING])} pixels.")
-        lines.append(
-            f"More than one optimum was seen at {per_cent(self.several_optima)} of the pixels with a result."
-        )
+        if math.isfinite(self.several_optima):
+            words = self.optima_in_words()
+            lines.append(f"{words[0].upper()}{words[1:]}.")
         worst = max(self.parameters, key=lambda p: p.at_bounds, default=None)
         if worst is not None and worst.at_bounds > 0.0:
             lines.append(f"{worst.label.text} is at a bound at {per_cent(worst.at_bounds)} of them.")
         return lines
+
+    def optima_in_words(self) -> str:
+        """How often there was more than one optimum."""
+        if not math.isfinite(self.several_optima):
+            return "no pixel was searched from many starts"
+        return (
+            f"of the pixels searched from many starts ({per_cent(self.searched)} of those with a result), "
+            f"{per_cent(self.several_optima)} have more than one optimum"
+        )
 
     def _fit_in_words(self) -> str:
         if self.reduced_chi2 >= _DESCRIBED:
