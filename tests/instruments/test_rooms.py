@@ -7,7 +7,7 @@ import pytest
 
 import pbrdf.instruments
 
-ROOMS = ("polarimeter", "frames", "goniometer", "reduction", "calibration", "virtual")
+ROOMS = ("polarimeter", "frames", "goniometer", "reduction", "pixel_geometry", "calibration", "virtual")
 FOLDER = Path(pbrdf.instruments.__file__).parent
 
 

@@ -10,7 +10,10 @@ import numpy as np
 from pbrdf.backend import get_backend
 from pbrdf.optics.geometry import geometry_from_angles
 
-__all__ = ["angles_of", "between", "ray_vectors"]
+__all__ = ["UPRIGHT", "across", "angles_of", "between", "ray_vectors"]
+
+#: A ray whose part across the normal is shorter runs along the normal: its azimuth is not known.
+UPRIGHT = 1e-12
 
 
 def ray_vectors(theta_i: np.ndarray, theta_r: np.ndarray, phi: np.ndarray) -> dict[str, np.ndarray]:
@@ -26,23 +29,27 @@ def ray_vectors(theta_i: np.ndarray, theta_r: np.ndarray, phi: np.ndarray) -> di
 
 
 def between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Angle between unit vectors, accurate when it is small; shape (G,)."""
+    """Angle between unit vectors, accurate when it is small; shape (...)."""
     return 2.0 * np.arctan2(np.linalg.norm(a - b, axis=-1), np.linalg.norm(a + b, axis=-1))
+
+
+def across(ray: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    """The part of vectors at right angles to unit vectors, shape (..., 3)."""
+    return ray - (ray * normal).sum(-1, keepdims=True) * normal
 
 
 def angles_of(
     normal: np.ndarray, source: np.ndarray, camera: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """θ_i, θ_r, φ from unit vectors away from the surface, shape (G, 3) each; φ within [0, 2π)."""
+    """θ_i, θ_r, φ from unit vectors away from the surface, shapes (..., 3) that broadcast; φ within [0, 2π).
 
-    def across(ray: np.ndarray) -> np.ndarray:
-        return ray - np.einsum("gk,gk->g", ray, normal)[:, None] * normal
-
-    forward = -across(source)
+    Seen or lit along the normal φ is 0.
+    """
+    seen = across(camera, normal)
+    forward = -across(source, normal)
     # under normal incidence every direction is forward: that of the camera
-    upright = np.linalg.norm(forward, axis=1) < 1e-12
-    forward[upright] = across(camera)[upright]
+    forward = np.where(np.linalg.norm(forward, axis=-1, keepdims=True) < UPRIGHT, seen, forward)
     left = np.cross(normal, forward)
-    phi = np.arctan2(np.einsum("gk,gk->g", camera, left), np.einsum("gk,gk->g", camera, forward))
-    phi = np.where(np.abs(phi) < 1e-12, 0.0, phi)
-    return between(normal, source), between(normal, camera), np.mod(phi, 2.0 * np.pi)
+    phi = np.arctan2((camera * left).sum(-1), (camera * forward).sum(-1))
+    none = (np.abs(phi) < 1e-12) | (np.linalg.norm(seen, axis=-1) < UPRIGHT)
+    return between(normal, source), between(normal, camera), np.mod(np.where(none, 0.0, phi), 2.0 * np.pi)

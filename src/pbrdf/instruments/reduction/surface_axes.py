@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from pbrdf.optics.elements import rotate_frame
-
 __all__ = ["to_surface_axes"]
 
 
@@ -26,14 +24,23 @@ def to_surface_axes(
     stokes, covariance
         Same shapes; NaN where a component that is not determined comes in.
     """
-    matrix = rotate_frame(-reference_angle)
-    unknown = (np.abs(matrix) > 1e-12) @ np.isnan(stokes)[..., None]
-    turned = np.einsum("gij,gj->gi", matrix, np.nan_to_num(stokes))
-    spread = np.einsum("gij,gjk,glk->gil", matrix, np.nan_to_num(covariance), matrix)
+    # the frame turns by −reference_angle, which mixes Q and U alone: element by element for the sake of many pixels
+    c, s = np.cos(2.0 * reference_angle), -np.sin(2.0 * reference_angle)
+    missing = np.isnan(stokes)
+    lost_q = (missing[:, 1] & (np.abs(c) > 1e-12)) | (missing[:, 2] & (np.abs(s) > 1e-12))
+    lost_u = (missing[:, 1] & (np.abs(s) > 1e-12)) | (missing[:, 2] & (np.abs(c) > 1e-12))
+    missing[:, 1], missing[:, 2] = lost_q, lost_u
+    turned, spread = np.nan_to_num(stokes), np.nan_to_num(covariance)
+    _turn(turned[:, 1], turned[:, 2], c, s)
+    _turn(spread[:, 1, :], spread[:, 2, :], c[:, None], s[:, None])
+    _turn(spread[:, :, 1], spread[:, :, 2], c[:, None], s[:, None])
     # rounding must not leave it unsymmetric
     spread = 0.5 * (spread + spread.transpose(0, 2, 1))
-    missing = unknown[..., 0]
-    return (
-        np.where(missing, np.nan, turned),
-        np.where(missing[:, :, None] | missing[:, None, :], np.nan, spread),
-    )
+    turned[missing] = np.nan
+    spread[missing[:, :, None] | missing[:, None, :]] = np.nan
+    return turned, spread
+
+
+def _turn(q: np.ndarray, u: np.ndarray, c: np.ndarray, s: np.ndarray) -> None:
+    """Put Q and U as read in turned axes in their places; c, s of twice the angle (pbrdf.optics.elements)."""
+    q[...], u[...] = c * q + s * u, c * u - s * q
