@@ -444,7 +444,7 @@ def _form(dataset: xr.Dataset, dims: Sequence[str]) -> xr.Dataset:
             coords[name] = (variable.dims, variable.values)
         elif name in STOKES_AXES:
             coords[name] = (variable.dims, variable.values)
-        elif own or (name in dataset.data_vars and name != MASK and variable.dtype.kind not in "biu"):
+        elif name in dataset.data_vars and (own or (name != MASK and variable.dtype.kind not in "biu")):
             variables[name] = (variable.dims, np.empty([0] * variable.ndim))
     form = xr.Dataset(coords=coords, attrs=dataset.attrs)
     # beside each other, not aligned: the schema is to judge them
