@@ -338,12 +338,10 @@ class Stack:
         inverse: dict[tuple[int, int], np.ndarray] = {}
         whitening: dict[tuple[int, int], np.ndarray] = {}
         for i in range(size):
+            inverse[i, i] = 1.0 / factor[i, i]
+            for j in range(i):
+                inverse[i, j] = -sum(factor[i, q] * inverse[q, j] for q in range(j, i)) * inverse[i, i]
             for j in range(i + 1):
-                if i == j:
-                    inverse[i, i] = 1.0 / factor[i, i]
-                else:
-                    total = sum(factor[i, q] * inverse[q, j] for q in range(j, i))
-                    inverse[i, j] = -total * inverse[i, i]
                 whitening[i, j] = inverse[i, j] / std[j]
         return replace(self, std=std, whitening=whitening, _uploaded={})
 
