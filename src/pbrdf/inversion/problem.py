@@ -212,7 +212,8 @@ def residuals(
     signals = _Signals(space.of_a_block, stack, accuracy, Float)
     measured = stack.upload("values", Float)
     stride = dr.opaque(UInt32, len(stack))
-    factors = weights = None
+    factors: dict[tuple[int, int], Any] | None = None
+    weights: list[Any] = []
     if stack.whitening is not None:
         factors = dict(zip(stack.whitening, stack.upload("whitening", Float), strict=True))
     else:

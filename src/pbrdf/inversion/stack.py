@@ -89,8 +89,11 @@ class Stack:
             whole = np.stack([o.whitening for o in data], axis=-1)
             size = len(first.channels)
             whitening = {(i, j): whole[i, j] for i in range(size) for j in range(i + 1)}
+        theta_i, theta_r, phi = (np.stack([getattr(o, name) for o in seen], axis=-1) for name in angles)
         return cls(
-            *(np.stack([getattr(o, name) for o in seen], axis=-1) for name in angles),
+            theta_i,
+            theta_r,
+            phi,
             channels=first.channels,
             values=np.ascontiguousarray(np.stack([o.values for o in data]).transpose(1, 2, 0)),
             std=np.ascontiguousarray(np.stack([o.std for o in data]).transpose(1, 2, 0)),
@@ -162,8 +165,11 @@ class Stack:
         def whole(of: list[np.ndarray]) -> np.ndarray:
             return np.ascontiguousarray(np.stack([channel.T for channel in of]))
 
+        theta_i, theta_r, phi = (np.nan_to_num(angles[name]) for name in ("theta_i", "theta_r", "phi"))
         stack = cls(
-            *(np.nan_to_num(angles[name]) for name in ("theta_i", "theta_r", "phi")),
+            theta_i,
+            theta_r,
+            phi,
             channels=found.channels,
             values=whole(found.values),
             std=whole(found.std),
@@ -218,7 +224,9 @@ class Stack:
 
         return replace(
             self,
-            **{name: some(getattr(self, name)) for name in ("theta_i", "theta_r", "phi")},
+            theta_i=some(self.theta_i),
+            theta_r=some(self.theta_r),
+            phi=some(self.phi),
             values=self.values[..., chosen],
             std=self.std[..., chosen],
             std_known=self.std_known[chosen],
@@ -270,18 +278,18 @@ class Stack:
         """Arrays of one attribute in memory of Dr.Jit's own, as they are read by a fit; kept for the next."""
         key = (name, Float.__name__)
         if key not in self._uploaded:
+            arrays: list[np.ndarray]
             if name == "weights":
-                with np.errstate(divide="ignore"):
-                    arrays: Sequence[np.ndarray] = 1.0 / self.std
-            elif name == "values":
-                arrays = self.values
+                arrays = list(1.0 / self.std)
             elif name == "whitening":
-                assert self.whitening is not None
-                arrays = list(self.whitening.values())
+                arrays = list((self.whitening or {}).values())
+            elif name == "values":
+                arrays = list(self.values)
             else:
                 arrays = [getattr(self, name)]
             self._uploaded[key] = [get_backend().upload(Float, array.ravel()) for array in arrays]
-        return self._uploaded[key]  # type: ignore[no-any-return]
+        found: list[Any] = self._uploaded[key]
+        return found
 
     def _with_covariance(self, covariance: np.ndarray) -> Stack:
         """With the covariance of the channels at each geometry, shape (G, C, C), for all data sets."""

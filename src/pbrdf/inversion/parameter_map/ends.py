@@ -33,7 +33,7 @@ class Ends:
 
     Attributes
     ----------
-    u, cost, information, status
+    u, cost, information, gradient, status
         As of :class:`~pbrdf.inversion.solver.Solution`, a lane for each pixel.
     optima
         Distinct optima seen, shape (B,).
@@ -44,6 +44,7 @@ class Ends:
     u: np.ndarray
     cost: np.ndarray
     information: np.ndarray
+    gradient: np.ndarray
     status: np.ndarray
     optima: np.ndarray
     starts: np.ndarray
@@ -55,6 +56,7 @@ class Ends:
             np.full((batch, size), np.nan),
             np.full(batch, np.inf),
             np.zeros((batch, size, size)),
+            np.zeros((batch, size)),
             np.full(batch, int(Status.NOT_FINITE)),
             np.zeros(batch, dtype=int),
             np.zeros(batch, dtype=int),
@@ -146,14 +148,12 @@ class Pixels:
             # the end that was known is one more; where it is none its cost is infinite
             row = np.concatenate([row, np.arange(count)])
             solution = Solution(
-                *(
-                    np.concatenate([getattr(solution, f.name), getattr(known, f.name)])
-                    for f in fields(Solution)
-                    if f.name in ("u", "cost", "information")
-                ),
-                gradient=np.empty((len(row), 0)),
-                status=np.concatenate([solution.status, known.status]),
-                iterations=np.empty(0),
+                np.concatenate([solution.u, known.u]),
+                np.concatenate([solution.cost, known.cost]),
+                np.concatenate([solution.information, known.information]),
+                np.concatenate([solution.gradient, known.gradient]),
+                np.concatenate([solution.status, known.status]),
+                np.zeros(len(row), dtype=int),
             )
         return _best(solution, row, low, high, first.shape[1] + (0 if known is None else known.starts))
 
@@ -192,7 +192,15 @@ class Pixels:
         """Ends of pixels from one start each, near them."""
         solution = self.end(pixels, start)
         one = np.isfinite(solution.cost).astype(int)
-        return Ends(solution.u, solution.cost, solution.information, solution.status, one, np.ones_like(one))
+        return Ends(
+            solution.u,
+            solution.cost,
+            solution.information,
+            solution.gradient,
+            solution.status,
+            one,
+            np.ones_like(one),
+        )
 
     def costs(self, owner: np.ndarray, u: np.ndarray) -> np.ndarray:
         """Cost of lanes without priors, in draft accuracy and single precision; 0 where there is no quick way to it."""
@@ -234,14 +242,14 @@ def _best(
     counted = np.where(converged, cost, np.inf)
     counted[here, best] = cost[here, best]
     optima = (grouped(u, counted, high - low, *ENDED, width) >= 0).sum(axis=1)
-    information = table(solution.information, 0.0)[here, best]
     return Ends(
         u[here, best],
         cost[here, best],
-        information,
+        table(solution.information, 0.0)[here, best],
+        table(solution.gradient, 0.0)[here, best],
         status[here, best],
         optima,
-        np.zeros(count, int) + starts,
+        np.zeros(count, dtype=int) + starts,
     )
 
 

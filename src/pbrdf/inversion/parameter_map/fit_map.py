@@ -7,6 +7,7 @@ import math
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -127,12 +128,18 @@ def fit_map(
         correlation=correlation,
     )
     if dataset.chunks:
+        if prepared.settings["share"]:
+            raise DataError(
+                "share: what pixels share is found in several passes over all of them, which Dask arrays would have to "
+                "be loaded for: give a data set that was opened without chunks, it is read block by block"
+            )
         return _lazy(prepared, dataset, block)
     clock = time.perf_counter()
+    blocks = list(blocks_of(dataset, prepared.dims, block))
+    prepared = prepared.solve_shared(_Blocks(dataset, blocks))
     result = prepared.template()
     for name in result.data_vars:
         result[name].variable.data = np.array(result[name].values)
-    blocks = list(blocks_of(dataset, prepared.dims, block))
     total, done = math.prod(dataset.sizes[d] for d in prepared.dims), 0
     for where in blocks:
         report = None
@@ -144,6 +151,17 @@ def fit_map(
         done += found["status"].size
     result.attrs |= summary(result) | {"seconds": time.perf_counter() - clock}
     return result
+
+
+@dataclass(frozen=True)
+class _Blocks:
+    """Blocks of a data set, each read when it is its turn, as often as they are gone through."""
+
+    dataset: xr.Dataset
+    where: list[dict[str, slice]]
+
+    def __iter__(self) -> Iterator[xr.Dataset]:
+        return (self.dataset.isel(where) for where in self.where)
 
 
 def summary(found: xr.Dataset) -> dict[str, Any]:
@@ -215,10 +233,10 @@ def _lazy(prepared: MapFit, dataset: xr.Dataset, block: int | Mapping[str, int] 
         dataset = dataset.chunk(block_sizes(dataset, prepared.dims, block))
     for name in map(str, dataset.variables):
         variable = dataset.variables[name]
-        for dim, chunks in variable.chunksizes.items():
-            if dim not in prepared.dims and len(chunks) > 1:
+        for dim, own in variable.chunksizes.items():
+            if dim not in prepared.dims and len(own) > 1:
                 raise DataError(
-                    f"{name} lies in {len(chunks)} chunks along {dim!r}, but every pixel needs all of it: "
+                    f"{name} lies in {len(own)} chunks along {dim!r}, but every pixel needs all of it: "
                     f"dataset.chunk({{{dim!r}: -1}}) makes it one"
                 )
     try:
@@ -228,8 +246,9 @@ def _lazy(prepared: MapFit, dataset: xr.Dataset, block: int | Mapping[str, int] 
             f"the variables lie in chunks that do not agree: dataset.unify_chunks() makes them ({error})"
         ) from None
     form = prepared.template()
-    chunked = form.chunk({str(d): chunks.get(str(d), -1) for d in form.dims}).assign_coords(form.coords)
-    return xr.map_blocks(_fit_chunk, dataset, kwargs={"prepared": prepared}, template=chunked)
+    chunked = form.chunk({str(d): chunks.get(str(d), -1) for d in form.dims})
+    found = xr.map_blocks(_fit_chunk, dataset, kwargs={"prepared": prepared}, template=chunked)
+    return found.assign_coords(form.coords)
 
 
 def _fit_chunk(block: xr.Dataset, *, prepared: MapFit) -> xr.Dataset:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -28,10 +28,12 @@ from pbrdf.inversion.observations import Observations, noise_in_words
 from pbrdf.inversion.parameter_map.ends import Ends, Pixels
 from pbrdf.inversion.parameter_map.layout import PixelStatus, broadcast_map, empty_map, template
 from pbrdf.inversion.parameter_map.search import fit_pixels
+from pbrdf.inversion.parameter_map.shared import Shared, Sums, described, newton, sums_of, with_priors
 from pbrdf.inversion.parameter_map.spread import spread_of
 from pbrdf.inversion.problem import Space
-from pbrdf.inversion.solver import Status
+from pbrdf.inversion.solver import BOUND_MARGIN, Status
 from pbrdf.inversion.stack import Stack
+from pbrdf.inversion.starts import sobol_starts
 from pbrdf.inversion.unknowns import bounds_of_each, check_choices, space_of, with_terms
 from pbrdf.models import DoubleGauss, Model
 from pbrdf.version import __version__
@@ -45,6 +47,9 @@ __all__ = ["LABEL", "MASK", "MapFit"]
 MASK, LABEL = "mask", "label"
 #: Changes whenever the same settings would give other numbers or another form.
 LAYOUT = 1
+#: Pixels of a label from which the shared parameters' starting values are found, and values between their bounds that
+#: are tried, too.
+FEW, BEGINNINGS = 24, 8
 _ANGLES = ("theta_i", "theta_r", "phi")
 _MEASURED = {*VARIABLES, *map(std_name, VARIABLES), COVARIANCE}
 
@@ -61,6 +66,8 @@ class MapFit:
         Everything that decides the numbers, as JSON can hold it.
     space
         The free parameters; bounds that follow from the data are those of values of 1.
+    shared
+        What :meth:`solve_shared` found of the parameters that pixels share; None before, or where there are none.
     """
 
     dims: tuple[str, ...]
@@ -69,6 +76,7 @@ class MapFit:
     _sizes: dict[str, int]
     _coords: dict[str, Any]
     _given: dict[str, Any]
+    shared: Shared | None = None
 
     @classmethod
     def prepare(
@@ -123,15 +131,15 @@ max_iterations, share, correlation
             like.with_covariance(covariance)
         space, begin = space_of(model, options or {}, fix or {}, free, bounds or {}, start or {}, like)
         space = with_terms(space, like, priors or {}, {}, terms, bounds or {}, loss)
-        if like.count <= len(space.free):
-            raise FitError(
-                f"{like.count} measured values cannot determine {len(space.free)} parameters: measure "
-                "more, or fix parameters"
-            )
         share = (share,) if isinstance(share, str) else tuple(share)
         for name in share:
             if name not in space.names:
                 raise FitError(f"share: {name!r} is not a free parameter; free are {', '.join(space.names)}")
+        if like.count <= len(space.free) - len(set(share)):
+            raise FitError(
+                f"{like.count} measured values cannot determine {len(space.free) - len(set(share))} parameters of a "
+                "pixel: measure more, or fix parameters"
+            )
         shown = space.build(0.5 * (space.lower + space.upper))
         settings = {
             "layout": LAYOUT,
@@ -182,11 +190,26 @@ max_iterations, share, correlation
             "options": self.settings["options"],
             "fixed": self.settings["fixed"],
         }
-        return {
+        found = {
             "model": json.dumps(described, ensure_ascii=False),
             "settings": json.dumps(self.settings, ensure_ascii=False),
             "noise": self._given["words"],
         }
+        if self.shared is not None:
+            found["shared"] = json.dumps(self._told(self.shared), ensure_ascii=False)
+        return found
+
+    def _told(self, shared: Shared) -> Mapping[str, Any]:
+        """What was found of the shared parameters, for the attributes."""
+        own = self._shared_space
+        values = own.to_parameters(shared.unknowns)
+        spread = np.sqrt(np.einsum("lss->ls", shared.covariance * self._scale(shared)[:, None, None]))
+        errors = np.where(spread > 0.0, spread * own.derivative(values), np.nan)
+        return described(shared, own.names, values, errors)
+
+    def _scale(self, shared: Shared) -> np.ndarray:
+        """What covariances are multiplied with: the reduced χ² of a label, where the uncertainties are a guess."""
+        return np.where(shared.std_known, 1.0, shared.chi2 / np.maximum(shared.freedom, 1))
 
     def template(self) -> xr.Dataset:
         """The map before any pixel was fitted: its form, coordinates and attributes, in no memory.
@@ -227,80 +250,232 @@ max_iterations, share, correlation
         DataError
             If directions that all pixels share are none. What is wrong at a pixel is left out there.
         """
+        if self.settings["share"] and self.shared is None:
+            raise FitError(
+                "share: what pixels share must be found first, from all of them: see MapFit.solve_shared"
+            )
         shape = [block.sizes[d] for d in self.dims]
         arrays = empty_map(len(self.space.free), shape, self.settings["correlation"])
-        flat = {
-            name: values.reshape(*values.shape[: values.ndim - len(shape)], -1)
-            for name, values in arrays.items()
-        }
-        status = flat["status"]
-        status[:] = int(PixelStatus.NOT_MEASURED)
-        wanted = self._wanted(block).ravel()
-        status[~wanted] = int(PixelStatus.MASKED)
-        stack = self._stack(block) if wanted.any() else None
-        if stack is not None:
-            self._fit_stack(stack, shape, wanted, flat, progress)
+        flat = {n: v.reshape(*v.shape[: v.ndim - len(shape)], -1) for n, v in arrays.items()}
+        part = self._part(block, flat)
+        if part is not None:
+            total, left = flat["status"].size, flat["status"].size - len(part.usable)
+            report = None if progress is None else lambda done: progress(left + done, total)
+            pixels = self._pixels(part, None if self.shared is None else self.shared.unknowns)
+            ends = fit_pixels(pixels, shape, part.places, part.freedom, part.stack.std_known, report)
+            self._store(ends, pixels, part, flat)
         if progress is not None:
-            progress(status.size, status.size)
-        coords = {name: block.coords[name] for name in self._coords if name in block.coords}
-        return self._assembled(arrays, coords)
+            progress(flat["status"].size, flat["status"].size)
+        return self._assembled(arrays, {n: block.coords[n] for n in self._coords if n in block.coords})
 
-    def _fit_stack(
-        self,
-        stack: Stack,
-        shape: Sequence[int],
-        wanted: np.ndarray,
-        flat: Mapping[str, np.ndarray],
-        progress: Callable[[int, int], None] | None,
-    ) -> None:
-        """Fit what was measured at the pixels of a block, into its arrays."""
-        status, size = flat["status"], len(self.space.free)
-        count = stack.count
-        freedom = count - size
-        flat["degrees_of_freedom"][:] = np.where(wanted, np.maximum(freedom, 0), 0)
-        few = wanted & (count > 0) & ((freedom <= 0) | (stack.different_values() < size))
-        status[few] = int(PixelStatus.TOO_FEW_VALUES)
-        usable = np.flatnonzero(wanted & (count > 0) & ~few)
-        if not len(usable):
-            return
-        if len(usable) < len(stack):
-            stack = stack.take(usable)
-        pixels = self._pixels(stack)
-        places = np.stack(np.unravel_index(usable, shape), axis=1)
-        total = status.size
-        report = None if progress is None else lambda done: progress(total - len(usable) + done, total)
-        ends = fit_pixels(pixels, shape, places, freedom[usable], stack.std_known, report)
-        self._store(ends, pixels, freedom[usable], usable, flat)
+    def solve_shared(self, blocks: Iterable[xr.Dataset]) -> MapFit:
+        """Find what pixels share, from all of them; what is returned fits blocks with it.
 
-    def _pixels(self, stack: Stack) -> Pixels:
-        lower, upper = bounds_of_each(self.space, stack, self._given["bounds"])
-        return Pixels(
+        Parameters
+        ----------
+        blocks
+            The blocks of the image, gone through several times; one is held at a time.
+
+        Raises
+        ------
+        FitError
+            If no pixel can be fitted.
+        """
+        if not self.settings["share"]:
+            return self
+        few, labels, low, high = self._first_pass(blocks)
+        columns = np.array([self.space.names.index(name) for name in self.settings["share"]])
+        priors = self._shared_space
+
+        def evaluate(theta: np.ndarray, parts: Iterable[_Part]) -> Sums:
+            total = Sums.zero(len(labels), len(columns))
+            for part in parts:
+                pixels = self._pixels(part, theta, labels)
+                ends = fit_pixels(pixels, part.shape, part.places, part.freedom, part.stack.std_known)
+                margin = BOUND_MARGIN * (pixels.high - pixels.low)
+                inside = (ends.u > pixels.low + margin) & (ends.u < pixels.high - margin)
+                total = total + sums_of(
+                    np.searchsorted(labels, part.label),
+                    len(labels),
+                    columns,
+                    ends.cost,
+                    ends.gradient,
+                    ends.information,
+                    inside,
+                    part.freedom + self._own,
+                    part.stack.std_known,
+                )
+            return with_priors(total, priors, theta)
+
+        # where to begin: the best of the middle of what single pixels say and of some values between the bounds
+        middle = self._middle(few, labels, columns, low, high)
+        spread = sobol_starts(
+            np.zeros(len(columns)), np.ones(len(columns)), BEGINNINGS, self.settings["seed"]
+        )
+        candidates = [middle, *(low + one * (high - low) for one in spread)]
+        tried = [evaluate(candidate, few).cost for candidate in candidates]
+        best = np.argmin(np.where(np.isfinite(tried), tried, np.inf), axis=0)
+        begin = np.stack(candidates)[best, np.arange(len(labels))]
+        theta, sums, converged, passes = newton(
+            lambda at: evaluate(at, (p for p in map(self._part, blocks) if p is not None)), begin, low, high
+        )
+        margin = BOUND_MARGIN * (high - low)
+        inside = (theta > low + margin) & (theta < high - margin)
+        spreads = [
+            spread_of(t[None], A[None], a[None], b[None], np.ones(1)).covariance[0]
+            for t, A, a, b in zip(theta, sums.curvature, low, high, strict=True)
+        ]
+        shared = Shared(
+            columns=columns,
+            labels=labels,
+            unknowns=theta,
+            low=low,
+            high=high,
+            covariance=np.stack(spreads),
+            chi2=2.0 * sums.cost,
+            freedom=(sums.values - sums.own - inside.sum(axis=1)).astype(int),
+            std_known=sums.guessed == 0,
+            converged=converged,
+            passes=passes,
+        )
+        values = self._shared_space.to_parameters(theta).tolist()
+        found = {str(label): row for label, row in zip(labels.tolist(), values, strict=True)}
+        settings = {**self.settings, "shared": found}
+        return replace(self, settings=settings, shared=shared)
+
+    def _first_pass(
+        self, blocks: Iterable[xr.Dataset]
+    ) -> tuple[list[_Part], np.ndarray, np.ndarray, np.ndarray]:
+        """Some pixels of each label; the labels; and the bounds of the shared unknowns, shape (L, S)."""
+        columns = [self.space.names.index(name) for name in self.settings["share"]]
+        limits: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+        held: dict[int, int] = {}
+        few = []
+        for block in blocks:
+            part = self._part(block)
+            if part is None:
+                continue
+            pixels, chosen = self._pixels(part), []
+            for label in np.unique(part.label).tolist():
+                here = np.flatnonzero(part.label == label)
+                low, high = (
+                    pixels.low[here][:, columns].min(axis=0),
+                    pixels.high[here][:, columns].max(axis=0),
+                )
+                known = limits.get(label, (low, high))
+                limits[label] = np.minimum(low, known[0]), np.maximum(high, known[1])
+                wanted = min(FEW - held.get(label, 0), len(here))
+                if wanted > 0:
+                    chosen.append(here[(np.arange(wanted) * len(here)) // wanted])
+                    held[label] = held.get(label, 0) + wanted
+            if chosen:
+                few.append(part.take(np.sort(np.concatenate(chosen))))
+        if not limits:
+            raise FitError("share: no pixel has enough measured values to be fitted")
+        labels = np.array(sorted(limits))
+        low, high = (np.stack([limits[label][k] for label in labels.tolist()]) for k in (0, 1))
+        return few, labels, low, high
+
+    def _middle(
+        self, few: list[_Part], labels: np.ndarray, columns: np.ndarray, low: np.ndarray, high: np.ndarray
+    ) -> np.ndarray:
+        """Median of what single pixels say of the shared unknowns, shape (L, S)."""
+        said: dict[int, list[np.ndarray]] = {label: [] for label in labels.tolist()}
+        for part in few:
+            enough = np.flatnonzero(part.freedom + self._own > len(self.space.free))
+            if len(enough):
+                ends = self._pixels(part).from_many(enough)
+                for label, u in zip(part.label[enough].tolist(), ends.u[:, columns], strict=True):
+                    said[label].append(u)
+        middle = 0.5 * (low + high)
+        for row, label in enumerate(labels.tolist()):
+            if said[label]:
+                middle[row] = np.nanmedian(said[label], axis=0)
+        return np.clip(middle, low, high)
+
+    @property
+    def _own(self) -> int:
+        """Number of parameters that each pixel has of its own."""
+        return len(self.space.free) - len(self.settings["share"])
+
+    @property
+    def _shared_space(self) -> Space:
+        """The shared parameters alone, with their priors."""
+        columns = [self.space.names.index(name) for name in self.settings["share"]]
+        return replace(
             self.space,
-            stack,
-            self.space.to_unknowns(lower),
-            self.space.to_unknowns(upper),
+            free=tuple(self.space.free[c] for c in columns),
+            terms=tuple(self.space.terms[c] for c in columns),
+            lower=self.space.lower[columns],
+            upper=self.space.upper[columns],
+        )
+
+    def _part(self, block: xr.Dataset, flat: Mapping[str, np.ndarray] | None = None) -> _Part | None:
+        """The pixels of a block that can be fitted, loaded; what the others are, into the arrays of a block."""
+        shape = [block.sizes[d] for d in self.dims]
+        label = self._labels(block).ravel()
+        wanted = label != 0
+        stack = self._stack(block) if wanted.any() else None
+        count = np.zeros(len(label), dtype=int) if stack is None else stack.count
+        freedom = count - self._own
+        few = wanted & (count > 0) & (freedom <= 0)
+        if stack is not None:
+            few |= wanted & (count > 0) & (stack.different_values() < self._own)
+        if flat is not None:
+            status = np.where(wanted, int(PixelStatus.NOT_MEASURED), int(PixelStatus.MASKED))
+            flat["status"][:] = np.where(few, int(PixelStatus.TOO_FEW_VALUES), status)
+            flat["degrees_of_freedom"][:] = np.where(wanted, np.maximum(freedom, 0), 0)
+        usable = np.flatnonzero(wanted & (count > 0) & ~few)
+        if stack is None or not len(usable):
+            return None
+        places = np.stack(np.unravel_index(usable, shape), axis=1)
+        stack = stack if len(usable) == len(stack) else stack.take(usable)
+        return _Part(stack, shape, usable, places, freedom[usable], label[usable])
+
+    def _pixels(
+        self, part: _Part, theta: np.ndarray | None = None, labels: np.ndarray | None = None
+    ) -> Pixels:
+        """The fits of some pixels, with shared unknowns held at ``theta``, (L, S), where there are some."""
+        lower, upper = bounds_of_each(self.space, part.stack, self._given["bounds"])
+        low, high = self.space.to_unknowns(lower), self.space.to_unknowns(upper)
+        space, starts = self.space, self.settings["starts"]
+        if theta is not None:
+            known = labels if labels is not None else self.shared.labels  # type: ignore[union-attr]
+            columns = [self.space.names.index(name) for name in self.settings["share"]]
+            low[:, columns] = high[:, columns] = theta[np.searchsorted(known, part.label)]
+            # a prior of what is shared counts once, not for each pixel
+            terms = [replace(t, prior=None) if c in columns else t for c, t in enumerate(space.terms)]
+            space = replace(space, terms=tuple(terms))
+            starts = starts if self._own else 1
+        return Pixels(
+            space,
+            part.stack,
+            low,
+            high,
             self._given["begin"],
             self._given["start"],
-            self.settings["starts"],
+            starts,
             self.settings["seed"],
             self.settings["max_iterations"],
         )
 
-    def _store(
-        self,
-        ends: Ends,
-        pixels: Pixels,
-        freedom: np.ndarray,
-        usable: np.ndarray,
-        flat: Mapping[str, np.ndarray],
-    ) -> None:
+    def _store(self, ends: Ends, pixels: Pixels, part: _Part, flat: Mapping[str, np.ndarray]) -> None:
         """Estimates and all that is said of them, into the arrays of a block."""
-        space, reached = self.space, ends.reached
+        space, reached, usable = self.space, ends.reached, part.usable
         converged = np.isin(ends.status, [s for s in Status if s.converged])
         chi2 = 2.0 * ends.cost
-        scale = np.where(pixels.stack.std_known, 1.0, chi2 / freedom)
-        spread = spread_of(ends.u, ends.information, pixels.low, pixels.high, scale)
-        lower, upper = space.to_parameters(pixels.low), space.to_parameters(pixels.high)
+        low, high, common = pixels.low, pixels.high, None
+        scale = np.where(part.stack.std_known, 1.0, chi2 / part.freedom)
+        if self.shared is not None:
+            row = np.searchsorted(self.shared.labels, part.label)
+            columns = self.shared.columns
+            low, high = low.copy(), high.copy()
+            low[:, columns], high[:, columns] = self.shared.low[row], self.shared.high[row]
+            scale = self._scale(self.shared)[row]
+            common = columns, self.shared.covariance[row]
+            converged &= self.shared.converged[row]
+        spread = spread_of(ends.u, ends.information, low, high, scale, common)
+        lower, upper = space.to_parameters(low), space.to_parameters(high)
         values = np.clip(space.to_parameters(ends.u), lower, upper)
         error = spread.error * space.derivative(values)
         trusted = converged[:, None] & (spread.flags == 0)
@@ -322,14 +497,16 @@ max_iterations, share, correlation
             # a parameter grows with its unknown: their correlations are the same
             flat["correlation"][..., usable] = np.moveaxis(found, 0, -1)
 
-    def _wanted(self, block: xr.Dataset) -> np.ndarray:
-        """Which pixels of a block are to be fitted, of the image's shape."""
+    def _labels(self, block: xr.Dataset) -> np.ndarray:
+        """Label of each pixel of a block, of the image's shape: 0 where it is left out, 1 where there are none."""
         shape = tuple(block.sizes[d] for d in self.dims)
-        wanted = np.ones(shape, dtype=bool)
-        for name in (MASK, self.settings["labels"]):
-            if name is not None and name in block.variables:
-                wanted &= block[name].transpose(*self.dims).values != 0
-        return wanted
+        name = self.settings["labels"]
+        label = np.ones(shape, dtype=np.int64)
+        if name is not None:
+            label = block[name].transpose(*self.dims).values.astype(np.int64)
+        if MASK in block.variables:
+            label = np.where(block[MASK].transpose(*self.dims).values != 0, label, 0)
+        return label
 
     def _stack(self, block: xr.Dataset) -> Stack | None:
         """What was measured at the pixels of a block; None where nothing was."""
@@ -366,6 +543,41 @@ max_iterations, share, correlation
             if any(np.isfinite(columns[name]).any() for name in columns if name in VARIABLES):
                 raise
             return None
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """The pixels of a block that can be fitted.
+
+    Attributes
+    ----------
+    stack
+        What was measured at them.
+    shape
+        Of the block.
+    usable, places
+        Their numbers and places in it, shapes (B,) and (B, N).
+    freedom, label
+        Degrees of freedom and label of each, shape (B,).
+    """
+
+    stack: Stack
+    shape: Sequence[int]
+    usable: np.ndarray
+    places: np.ndarray
+    freedom: np.ndarray
+    label: np.ndarray
+
+    def take(self, chosen: np.ndarray) -> _Part:
+        """Only some pixels."""
+        return _Part(
+            self.stack.take(chosen),
+            self.shape,
+            self.usable[chosen],
+            self.places[chosen],
+            self.freedom[chosen],
+            self.label[chosen],
+        )
 
 
 def _columns(

@@ -195,6 +195,7 @@ def _offer(pixels: Pixels, ends: Ends, beside: np.ndarray, chosen: np.ndarray) -
             found.u,
             found.cost,
             found.information,
+            found.gradient,
             found.status,
             np.maximum(old.optima, found.optima + more),
             old.starts + 1,

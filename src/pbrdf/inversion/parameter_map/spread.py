@@ -35,7 +35,12 @@ class Spread(NamedTuple):
 
 
 def spread_of(
-    u: np.ndarray, information: np.ndarray, low: np.ndarray, high: np.ndarray, scale: np.ndarray
+    u: np.ndarray,
+    information: np.ndarray,
+    low: np.ndarray,
+    high: np.ndarray,
+    scale: np.ndarray,
+    shared: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> Spread:
     """What :func:`~pbrdf.inversion.estimates.estimates_at` says of one fit, of many.
 
@@ -47,16 +52,27 @@ def spread_of(
         Bounds of the unknowns, shape (B, P).
     scale
         What the covariance is multiplied with, shape (B,): the reduced χ² where the uncertainties' scale is a guess.
+    shared
+        Columns of the unknowns that were found from all pixels, shape (S,), and their covariance C, (B, S, S): with
+        K = −A_φφ⁻¹ A_φθ, A being the information, the pixel's own have A_φφ⁻¹ + K C Kᵀ, and K C with the shared ones.
     """
     margin = BOUND_MARGIN * (high - low)
     at_low, at_high = u <= low + margin, u >= high - margin
     inside = ~(at_low | at_high)
     prior = prior_spread(low, high)
-    found = _inverse(information, inside, prior) * scale[:, None, None]
+    own = inside
+    if shared is not None:
+        own = inside.copy()
+        own[:, shared[0]] = False
+    found = _inverse(information, own, prior)
+    if shared is not None:
+        columns, common = shared
+        slope = -found @ information[:, :, columns]
+        slope[:, columns] = np.eye(len(columns))
+        found = found + slope @ common @ slope.swapaxes(1, 2)
+    found *= scale[:, None, None]
     with np.errstate(invalid="ignore"):
-        error = np.sqrt(np.einsum("bpp->bp", found))
-    error = np.where(inside, error, np.nan)
-    with np.errstate(invalid="ignore"):
+        error = np.where(inside, np.sqrt(np.einsum("bpp->bp", found)), np.nan)
         undetermined = error >= prior
     flags = (
         at_low * np.uint8(FLAGS["at_lower_bound"])
