@@ -29,6 +29,7 @@ from pbrdf.cli.export import export
 from pbrdf.cli.fit import fit
 from pbrdf.cli.interrupt import INTERRUPTED, end, heard_at_once, say_when_interrupted, what_is_said
 from pbrdf.cli.lists import models, paints
+from pbrdf.cli.map import map_pixels
 from pbrdf.cli.measure import measure
 from pbrdf.cli.options import ReadingCommand
 from pbrdf.cli.plan import plan
@@ -138,6 +139,7 @@ def options(
 
 app.command(cls=ReadingCommand)(fit)
 app.command(cls=ReadingCommand)(compare)
+app.command("map")(map_pixels)
 app.command()(simulate)
 app.command()(calibrate)
 app.command()(polarimeter)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -36,15 +37,17 @@ from pbrdf.errors import PbrdfError
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pbrdf.inversion.map_store import MapStore, Work
+    from pbrdf.inversion.map_store.picture_source import PictureSource
     from pbrdf.inversion.parameter_map import MapFit
-    from pbrdf.report.parameter_map.quicklook import QuickLook
+    from pbrdf.models import Model
+    from pbrdf.report.parameter_map.subject import MapReport
 
 __all__ = ["map_pixels"]
 
 _MACHINES = "Many machines"
-#: Pixels of a map that is fitted in memory, at most: those of a netCDF file.
-_MOST_IN_MEMORY = 4_000_000
+_FITTING, _SHARING, _QUICK_LOOK = "Fitting", "Finding what pixels share", "quicklook.png"
+#: Numbers of the data of a map that is fitted in memory, as for a netCDF file, at most.
+_MOST_IN_MEMORY = 200_000_000
 
 
 def map_pixels(
@@ -52,8 +55,8 @@ def map_pixels(
         list[Path],
         typer.Argument(
             metavar="STOKES",
-            help="Stokes pictures (stokes.nc or .zarr of `pbrdf reduce`), data with further dimensions beside geometry, "
-            "or with --polarimeter raw frames. Several: more series of the same pixels.",
+            help="Stokes pictures (stokes.nc or .zarr of `pbrdf reduce`), data with dimensions beside geometry, or with "
+            "--polarimeter raw frames. Several: more series of the same pixels.",
         ),
     ],
     geometry: Annotated[
@@ -61,17 +64,16 @@ def map_pixels(
         typer.Option(
             "--geometry",
             "-g",
-            help="Geometry of the pixels, angles in degrees: flat:theta_i=30,theta_r=40,phi=0[,fov=20]; "
-            "sphere:light=POLAR@AZIMUTH; cylinder:…; normals:FILE,light=…; angles:FILE; mesh:FILE,… (docs/maps.md). "
-            "Repeat it for one a file.",
-            metavar="KIND[:FILE][,KEY=VALUE…]",
+            help="Geometry of the pixels of Stokes pictures: flat, sphere, cylinder, normals, angles or mesh, see below; "
+            "repeat it for one a file.",
+            metavar="KIND[:…]",
         ),
     ] = None,
     output: Annotated[
         Path | None,
         output_option(
             "The map: a store (.zarr), resumed if it is there, or a small map in one file (.nc).",
-            show_default="<stokes>-map.zarr",
+            show_default="STOKES-map.zarr",
         ),
     ] = None,
     model: FittedModel = "double-gauss",
@@ -102,7 +104,7 @@ def map_pixels(
     labels: Annotated[
         Path | None,
         typer.Option(
-            help="Picture of whole numbers (PNG, TIFF, NPY): the part of the sample each pixel belongs to; 0 is left out.",
+            help="Parts of the sample: a picture of whole numbers, 0 is left out, or regions (TOML, CSV).",
             metavar="FILE",
         ),
     ] = None,
@@ -163,8 +165,12 @@ def map_pixels(
     """Fit a model to every pixel: maps of its parameters with their standard errors.
 
     Writes the map (docs/maps.md says how to read it with xarray), and beside it the folder MAP-report: a page
-    (index.html: open it in a browser), summary.txt and figures. While it runs, MAP-report/quicklook.png shows how far it
-    is. Interrupted or killed, it goes on where it was when the same command is run again.
+    (index.html: open it in a browser), summary.txt and figures. While it runs, MAP-report/quicklook.png shows what is
+    done. Interrupted or killed, it goes on where it was when the same command is run again.
+
+    Geometries (angles in degrees, all keys in docs/maps.md): `flat`, with `theta_i=30,theta_r=40,phi=0` after a colon or
+    the angles of `pbrdf reduce --angles`, and `fov=20` for perspective; `sphere:light=POLAR@AZIMUTH` and
+    `cylinder:light=…`, found in the picture; `normals:FILE,light=…`; `angles:FILE`; `mesh:FILE,camera=X/Y/Z,light=…`.
 
     Exit code 3: not one of the measured pixels has converged.
 
@@ -196,35 +202,45 @@ def map_pixels(
     if angles is not None and polarimeter is None:
         raise PbrdfError("--angles belongs to --polarimeter: Stokes pictures and data hold their own angles")
     chosen = fitted_model(model)
+    from pbrdf.files.atomic import require_writable_folder
     from pbrdf.instruments.pixel_geometry.text_form import parse_pixel_geometry
-    from pbrdf.instruments.reduction.region_files import read_labels
 
     places = [parse_pixel_geometry(text) for text in geometry or ()]
-    parts = None if labels is None else read_labels(labels)
+    report = target.with_name(f"{target.stem}-report")
+    require_writable_folder(report)
     if backend is not None:
         from pbrdf.backend import set_backend
 
         set_backend(backend)
     if polarimeter is not None:
         stokes = _reduced(stokes, polarimeter, angles, target, quiet)
+    from pbrdf.inversion.map_store import open_map
     from pbrdf.inversion.map_store.picture_source import PictureSource
     from pbrdf.inversion.parameter_map import MapFit
     from pbrdf.inversion.parameter_map.map_fit import LABEL
+    from pbrdf.report.parameter_map.subject import MapReport
 
-    source = PictureSource.open(stokes, places, scale=counts_per_brdf, labels=parts)
-    fit = MapFit.prepare(source.outline(), chosen, labels=None if parts is None else LABEL, **arguments)
-    report = target.with_name(f"{target.stem}-report")
-    require_writable_folder(report)
-    look = QuickLook(report / "quicklook.png", target.name) if figures else None
+    named = None if labels is None else LABEL
+    source = PictureSource.open(stokes, places, scale=counts_per_brdf, labels=labels)
+    fit = MapFit.prepare(source.outline(), chosen, labels=named, **arguments)
     if target.suffix == ".nc":
-        _fit_in_memory(source, fit, target, quiet)
-    elif not _fill(target, fit, source, place, scheduler, unit, look, quiet):
-        if quiet:
-            print(target)
-        return
-    _report(
-        target, report, stokes, {"model": model, **arguments, "geometry": geometry}, formats, figures, quiet
+        found = _fit_in_memory(source, chosen, target, {"labels": named, **arguments}, quiet)
+    else:
+        picture = report / _QUICK_LOOK if figures else None
+        if not _fill(target, fit, source, place, scheduler, unit, picture, quiet):
+            if quiet:
+                print(target)
+            return
+        found = open_map(target)
+    subject = MapReport(
+        found,
+        target,
+        [str(path) for path in stokes],
+        {"model": model, **arguments, "geometry": geometry, "counts per brdf": counts_per_brdf},
+        command_line(),
+        simulated=bool(source.outline().attrs.get("simulated")),
     )
+    _report(subject, report, formats, figures, quiet)
 
 
 def _check_output(target: Path, place: tuple[int, int] | None, scheduler: str | None) -> None:
@@ -301,21 +317,26 @@ def _newest(path: Path) -> float:
     return max((file.stat().st_mtime for file in files if file.is_file()), default=0.0)
 
 
-def _fit_in_memory(source: PictureSource, fit: MapFit, target: Path, quiet: bool) -> None:
+def _fit_in_memory(
+    source: PictureSource, model: str | Model, target: Path, arguments: dict[str, Any], quiet: bool
+) -> xr.Dataset:
     """Fit a small map and write it into one file."""
     from pbrdf.files.atomic import atomic_file
     from pbrdf.files.netcdf_files import write_netcdf_file
+    from pbrdf.inversion.parameter_map import fit_map
 
-    form = source.outline()
-    numbers = sum(variable.size for variable in form.variables.values())
+    numbers = sum(variable.size for variable in source.outline().variables.values())
     if numbers > _MOST_IN_MEMORY:
         raise PbrdfError(
-            f"--output {target}: {numbers:.2g} numbers are too many for a map in memory: choose a name that ends in .zarr"
+            f"--output {target}: the data have {numbers:.2g} numbers, too many for a map in memory: choose a name that "
+            "ends in .zarr"
         )
-    with stage_bar(quiet, "Fitting pixels") as show:
-        found = fit.fit_whole(source.block({}), lambda done, total: show("Fitting pixels", done, total))
+    with stage_bar(quiet, _FITTING) as show:
+        progress = functools.partial(show, f"{_FITTING}, pixels")
+        found = fit_map(source.block({}), model, progress=progress, **arguments)
     with atomic_file(target) as beside:
         write_netcdf_file(beside, {"/": found})
+    return found
 
 
 def _fill(
@@ -325,26 +346,35 @@ def _fill(
     place: tuple[int, int] | None,
     scheduler: str | None,
     unit: int | None,
-    look: QuickLook | None,
+    picture: Path | None,
     quiet: bool,
 ) -> bool:
     """Fit what is missing in the store of a map; returns whether it is complete."""
     from pbrdf.inversion.map_store import prepare_store, run_on_scheduler, run_units
+    from pbrdf.inversion.map_store.shared_file import with_shared
+    from pbrdf.report.parameter_map.quicklook import QuickLook
 
-    side = None if unit is None else dict.fromkeys(fit.dims, unit)
+    if fit.settings["share"]:
+        kept = target.with_name(f"{target.stem}-shared.npz")
+        with stage_bar(quiet, _SHARING) as show:
+            fit = with_shared(fit, source, kept, progress=functools.partial(show, f"{_SHARING}, units"))
+    sizes = fit.template()["status"].sizes
+    side = None if unit is None else {dim: min(unit, sizes[dim]) for dim in fit.dims}
     store = prepare_store(target, fit, source, shard=side)
-    state = [0, 0]
-
-    def interrupted() -> str:
-        return f"interrupted; {state[0]} of {state[1]} units are kept in {target}: the same command goes on from there"
-
-    say_when_interrupted(interrupted)
-    with stage_bar(quiet, "Fitting units of pixels") as show:
+    look = None if picture is None else QuickLook(store, picture)
+    state = [0, store.grid.count]
+    say_when_interrupted(
+        lambda: (
+            f"interrupted; {state[0]} of {state[1]} units are kept in {target}: the same command goes on from there"
+        )
+    )
+    with stage_bar(quiet, _FITTING) as show:
 
         def progress(done: int, total: int) -> None:
             state[:] = done, total
-            show("Fitting units of pixels", done, total)
-            ...
+            show(f"{_FITTING}, units", done, total)
+            if look is not None:
+                look()
 
         if scheduler is not None:
             work = run_on_scheduler(store, scheduler, progress=progress)
@@ -358,34 +388,23 @@ def _fill(
     return not work.left
 
 
-def _report(
-    target: Path,
-    folder: Path,
-    stokes: Sequence[Path],
-    settings: dict[str, Any],
-    formats: Sequence[str],
-    figures: bool,
-    quiet: bool,
-) -> None:
+def _report(subject: MapReport, folder: Path, formats: Sequence[str], figures: bool, quiet: bool) -> None:
     """Write the page beside a map and print what it says."""
     from pbrdf.report.parameter_map.folder import write_map_report
-    from pbrdf.report.parameter_map.subject import MapReport
     from pbrdf.report.parameter_map.summary import print_map
     from pbrdf.report.style import leave_out_help_texts
 
     if figures:
         leave_out_help_texts()
-    found = _open(target)
-    subject = MapReport(found, target, [str(path) for path in stokes], settings, command_line(), ...)
     with stage_bar(quiet, "Drawing the map"):
         summary, files = write_map_report(subject, folder, formats=formats, figures=figures)
-    (folder / "quicklook.png").unlink(missing_ok=True)
+    (folder / _QUICK_LOOK).unlink(missing_ok=True)
     if quiet:
-        print(target)
+        print(subject.path)
     else:
         console = output_console()
         print_map(summary, console)
         names = ", ".join(file.name for file in files)
-        console.print(f"\nWritten: {target}, and {folder}/: {names}", markup=False)
+        console.print(f"\nWritten: {subject.path}, and {folder}/: {names}", markup=False)
     if summary.measured and not summary.fitted:
         raise typer.Exit(NOT_CONVERGED)

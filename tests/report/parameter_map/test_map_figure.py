@@ -94,7 +94,7 @@ def test_counts_have_whole_steps_and_the_last_one_says_if_there_are_more():
     figure = quality_figure(ShownMap(found), "paint")
     image = next(ax for ax in figure.axes if ax.get_title() == "distinct optima seen").images[0]
     labels = [text.get_text() for text in image.colorbar.ax.get_yticklabels()]
-    assert labels == ["1", "2", "3", "4", "5 or more"]
+    assert labels == ["1", "2", "3", "4", "≥ 5"]
     assert image.get_array().max() == 5
 
 

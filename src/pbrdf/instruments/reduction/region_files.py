@@ -102,7 +102,7 @@ def read_regions(path: str | Path) -> dict[str, Region]:
     elif kind in TABLE_EXTENSIONS:
         regions = _from_csv(path)
     elif kind in SUFFIXES:
-        labels = read_labels(path)
+        labels = _labels(path)
         values = np.unique(labels)
         if len(values) > _MOST_LABELS:
             raise DataError(f"{path}: {len(values)} different values are more than regions can have")
@@ -142,7 +142,7 @@ def _from_table(table: Any, folder: Path) -> Region:
     if keys == {"polygon"}:
         return _polygon(table["polygon"])
     if keys == {"labels", "value"} and type(table["value"]) is int:
-        return LabelRegion(read_labels(folder / table["labels"]), table["value"])
+        return LabelRegion(_labels(folder / table["labels"]), table["value"])
     raise ValueError
 
 
@@ -166,14 +166,41 @@ def _from_csv(path: Path) -> dict[str, Region]:
     return regions
 
 
-def read_labels(path: Path) -> np.ndarray:
-    """A picture of whole numbers, shape (rows, columns).
+def read_labels(path: Path, rows: int, columns: int) -> np.ndarray:
+    """The number of the region that each pixel belongs to, 0 for none.
+
+    Parameters
+    ----------
+    path
+        A picture of labels, whose numbers these are; or other regions, counted from 1 in their order: where they overlap
+        the last one counts.
+    rows, columns
+        Of the picture that the regions are in.
+
+    Returns
+    -------
+    array
+        Whole numbers, shape (rows, columns).
 
     Raises
     ------
     DataError
-        If it is another picture, or none.
+        Names the file, and what is wrong in it.
     """
+    if path.suffix.lower() in SUFFIXES:
+        labels = _labels(path)
+        if labels.shape != (rows, columns):
+            raise DataError(
+                f"{path}: has {labels.shape[0]} × {labels.shape[1]} pixels, the picture {rows} × {columns}"
+            )
+        return labels
+    labels = np.zeros((rows, columns), dtype=np.uint16)
+    for number, region in enumerate(read_regions(path).values(), start=1):
+        labels[region.mask(0, rows, columns)] = number
+    return labels
+
+
+def _labels(path: Path) -> np.ndarray:
     file = open_pictures(path)
     if file.count != 1 or file.dtype.kind not in "uib":
         raise DataError(f"{path}: a picture of labels is one picture of whole numbers")

@@ -7,7 +7,9 @@ several series, or several geometries, of the same pixels.
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -21,9 +23,11 @@ from pbrdf.data.formats.stored import pixels_from_stored
 from pbrdf.data.formats.zarr_folder import open_zarr
 from pbrdf.data.schema import COORDINATES, DIMENSION, STOKES_AXES
 from pbrdf.errors import DataError
+from pbrdf.files.digest import sha256_of
 from pbrdf.files.netcdf_files import open_netcdf
 from pbrdf.instruments.pixel_geometry.geometry import PixelGeometry
 from pbrdf.instruments.pixel_geometry.map_dataset import map_block
+from pbrdf.instruments.reduction.region_files import read_labels
 from pbrdf.inversion.map_store.map_source import file_identity
 from pbrdf.inversion.parameter_map.map_fit import LABEL
 from pbrdf.optics.stokes import STOKES
@@ -65,7 +69,7 @@ class PictureSource:
         geometry: Sequence[PixelGeometry] | None = None,
         *,
         scale: float | None = None,
-        labels: np.ndarray | None = None,
+        labels: Path | None = None,
     ) -> PictureSource:
         """Look at the files, and find in the pictures what the geometry leaves open.
 
@@ -75,8 +79,10 @@ class PictureSource:
             The files.
         geometry
             One for all files, or one for each; None if the files hold data.
-        scale, labels
-            As the attributes.
+        scale
+            As the attribute.
+        labels
+            A file of :func:`~pbrdf.instruments.reduction.region_files.read_labels`.
 
         Raises
         ------
@@ -110,13 +116,14 @@ class PictureSource:
                 raise DataError(
                     f"{path}: has {_in_words(sizes)} pixels, {paths[0]} has {_in_words(found[0])}"
                 )
-        shape = tuple(found[0].get(dim, 0) for dim in ("y", "x"))
-        if labels is not None and labels.shape != shape:
-            raise DataError(
-                f"the picture of labels has {labels.shape[0]} × {labels.shape[1]} pixels, the data have "
-                f"{_in_words(found[0])}"
-            )
-        return cls(tuple(paths), located, scale, labels, found[0], opened)
+        parts = None
+        if labels is not None:
+            if not {"y", "x"} <= set(found[0]):
+                raise DataError(
+                    f"{labels}: regions are parts of pictures over y and x, not of {_in_words(found[0])}"
+                )
+            parts = read_labels(labels, found[0]["y"], found[0]["x"])
+        return cls(tuple(paths), located, scale, parts, found[0], opened)
 
     def __getstate__(self) -> dict[str, Any]:
         # open files stay in their process
@@ -171,15 +178,38 @@ class PictureSource:
         """Files by their size, variables and the digest of a sample; geometry, scale and labels."""
         return {
             "files": [file_identity(path, one) for path, one in zip(self.paths, self._files(), strict=True)],
-            "geometry": None if self.geometry is None else [repr(geometry) for geometry in self.geometry],
+            "geometry": _plain(self.geometry),
             "scale": self.scale,
-            "labels": None if self.labels is None else hashlib.sha256(self.labels.tobytes()).hexdigest(),
+            "labels": _plain(self.labels),
         }
 
     def _files(self) -> list[xr.Dataset]:
         if not self._opened:
             self._opened.extend(opened_pictures(path) for path in self.paths)
         return self._opened
+
+
+def _plain(value: Any) -> Any:
+    """What decides a geometry, as JSON can hold it: arrays and files by their digests."""
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        own = {f.name: _plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
+        return {"kind": type(value).__name__, **own}
+    if isinstance(value, np.ndarray):
+        return {
+            "shape": list(value.shape),
+            "digest": hashlib.sha256(np.ascontiguousarray(value)).hexdigest(),
+        }
+    if isinstance(value, xr.Dataset):
+        return {str(name): _plain(variable.values) for name, variable in value.variables.items()}
+    if isinstance(value, Path):
+        return {"file": value.name, "digest": sha256_of(value)}
+    if isinstance(value, Mapping):
+        return {str(name): _plain(item) for name, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    return str(value) if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def opened_pictures(path: Path) -> xr.Dataset:

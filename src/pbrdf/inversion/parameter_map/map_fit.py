@@ -338,10 +338,13 @@ max_iterations, share, correlation
             converged=converged,
             passes=passes,
         )
-        values = self._shared_space.to_parameters(theta).tolist()
-        found = {str(label): row for label, row in zip(labels.tolist(), values, strict=True)}
-        settings = {**self.settings, "shared": found}
-        return replace(self, settings=settings, shared=shared)
+        return self.with_shared(shared)
+
+    def with_shared(self, shared: Shared) -> MapFit:
+        """The same with what :meth:`solve_shared` has found before."""
+        values = self._shared_space.to_parameters(shared.unknowns).tolist()
+        found = {str(label): row for label, row in zip(shared.labels.tolist(), values, strict=True)}
+        return replace(self, settings={**self.settings, "shared": found}, shared=shared)
 
     def _first_pass(
         self, blocks: Iterable[xr.Dataset]

@@ -441,7 +441,7 @@ def _draw_counts(ax: Axes, shown: ShownMap, counts: np.ndarray, first: int) -> N
     _others(ax, shown)
     bar = ax.figure.colorbar(image, cax=ax.inset_axes((1.0, 0.0, 0.05, 1.0), transform=beside(ax)))
     ticks = np.arange(first, last + 1)
-    bar.set_ticks(ticks, labels=[*map(str, ticks[:-1]), f"{last} or more" if most > last else str(last)])
+    bar.set_ticks(ticks, labels=[*map(str, ticks[:-1]), f"≥ {last}" if most > last else str(last)])
     bar.ax.tick_params(length=0)
 
 
@@ -503,12 +503,20 @@ def _draw_goodness(ax: Axes, shown: ShownMap) -> None:
     typical = int(np.median(freedom))
     expected = stats.chi2(typical)
     low, high = min(low, expected.ppf(0.01) / typical), max(high, expected.ppf(0.99) / typical)
-    edges = np.linspace(low, high, _bins(values) + 1)
+    count = _bins(values)
+    edges = (
+        np.geomspace(low, high, count + 1) if high > _WIDE * low > 0.0 else np.linspace(low, high, count + 1)
+    )
     ax.hist(values, bins=edges, color=BLUE, alpha=0.75, label="found")
-    at = np.linspace(low, high, 200)
+    if high > _WIDE * low > 0.0:
+        ax.set_xscale("log")
+        _plain_ticks(ax.xaxis)
+    # how many pixels a bar as wide as those there would have
+    at = np.interp(np.linspace(0.0, count, 300), np.arange(count + 1), edges)
+    width = np.interp(at, edges, np.gradient(edges))
     ax.plot(
         at,
-        values.size * (edges[1] - edges[0]) * typical * expected.pdf(at * typical),
+        values.size * width * typical * expected.pdf(at * typical),
         color=RED,
         label=f"expected, {typical} degrees of freedom",
     )

@@ -1,17 +1,17 @@
-"""A picture of a map while it is being made: only what has come since is read, and the file changes in one step."""
+"""A picture of a map while its store is filled: only what has come since is read, and the file changes in one step."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pbrdf.files.atomic import atomic_file
+from pbrdf.inversion.map_store import open_map
 from pbrdf.report.parameter_map.shown_map import ShownMap, Window
 
 if TYPE_CHECKING:
-    import xarray as xr
+    from pbrdf.inversion.map_store import MapStore
 
 __all__ = ["QuickLook"]
 
@@ -22,51 +22,45 @@ _PIXELS = 240
 
 
 class QuickLook:
-    """A picture of all parameters that fills as the work goes on.
+    """A picture of all parameters that fills as the work goes on, whoever does it.
 
     Parameters
     ----------
+    store
+        What is being filled.
     path
-        The picture, PNG.
-    title
-        Above it.
+        The picture, PNG; its folder is made where it is missing.
     every
         Seconds between two pictures, at least.
     """
 
-    def __init__(self, path: Path, title: str, *, every: float = _EVERY) -> None:
-        self._path, self._title, self._every = path, title, every
+    def __init__(self, store: MapStore, path: Path, *, every: float = _EVERY) -> None:
+        self._store, self._path, self._every = store, path, every
         self._shown: ShownMap | None = None
-        self._next = time.monotonic() + every
-        self._stale = False
+        self._left = set(range(store.grid.count))
+        self._next = time.monotonic()
 
-    def update(self, dataset: xr.Dataset, region: Mapping[str, slice]) -> None:
-        """Take what a part of the map holds now, and draw if the last picture is old enough.
-
-        Parameters
-        ----------
-        dataset
-            The map as it is stored.
-        region
-            The part that is new, slices by dimension.
-        """
-        if self._shown is None:
-            self._shown = ShownMap(dataset, Window.of(dataset, _PIXELS), empty=True)
-        self._shown.update(dataset, region)
-        self._stale = True
-        if time.monotonic() >= self._next:
-            self.draw()
-
-    def draw(self) -> None:
-        """Draw now if there is something new."""
-        if self._shown is None or not self._stale:
+    def __call__(self) -> None:
+        """Draw what is done by now, if the last picture is old enough and something has come since."""
+        if time.monotonic() < self._next:
+            return
+        new = [number for number in sorted(self._left) if self._store.is_done(number)]
+        if not new:
             return
         from pbrdf.report.parameter_map.figure import overview_figure
         from pbrdf.report.style import save_figure
 
         began = time.monotonic()
+        with open_map(self._store.path, partial=True) as stored:
+            if self._shown is None:
+                self._shown = ShownMap(stored, Window.of(stored, _PIXELS), empty=True)
+            for number in new:
+                self._shown.update(stored, self._store.grid.slices(number))
+        self._left.difference_update(new)
+        done = self._store.grid.count - len(self._left)
+        title = f"{self._store.path.name}: {done} of {self._store.grid.count} units are done"
+        self._path.parent.mkdir(parents=True, exist_ok=True)
         with atomic_file(self._path) as beside:
-            save_figure(overview_figure(self._shown, self._title), beside)
-        self._stale = False
+            save_figure(overview_figure(self._shown, title), beside)
         now = time.monotonic()
         self._next = now + max(self._every, _PART * (now - began))

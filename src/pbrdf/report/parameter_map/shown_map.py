@@ -67,9 +67,10 @@ class Label:
 def labels_of(dataset: xr.Dataset) -> list[Label]:
     """Of the parameters of a map, in their order."""
     known = _declared(dataset)
-    units = dataset["unit"].values.astype(str) if "unit" in dataset.coords else None
+    # Zarr gives text another type than NumPy's
+    units = [str(unit) for unit in dataset["unit"].values] if "unit" in dataset.coords else None
     labels = []
-    for k, name in enumerate(dataset["parameter"].values.astype(str)):
+    for k, name in enumerate(map(str, dataset["parameter"].values)):
         parameter = known.get(name)
         unit = str(units[k]) if units is not None else (parameter.unit if parameter is not None else "")
         factor = 1.0
