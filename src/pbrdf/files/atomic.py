@@ -37,6 +37,7 @@ __all__ = [
     "MARK",
     "atomic_file",
     "atomic_folder",
+    "atomic_new_folder",
     "require_new_folder",
     "require_whole",
     "require_writable_folder",
@@ -113,6 +114,32 @@ def atomic_folder(path: Path, *, fill: bool = False) -> Iterator[Path]:
     finally:
         if not done:
             _remove_empty(made)
+
+
+@contextmanager
+def atomic_new_folder(path: Path) -> Iterator[Path]:
+    """An empty folder to write into that becomes `path` when the block ends well, unless another is that by then.
+
+    Of several processes that make the same folder one is first; what the others have written goes.
+
+    Raises
+    ------
+    DataError
+        If the folder cannot be written, or the disk is full.
+    """
+    try:
+        with _workspace(path) as space:
+            new = space / path.name
+            new.mkdir()
+            yield new
+            try:
+                new.rename(path)
+            except OSError:
+                # a folder takes no other's place unless that is empty
+                if not path.exists():
+                    raise
+    except OSError as error:
+        raise _not_written(path, error) from error
 
 
 def require_whole(folder: Path) -> None:

@@ -1,0 +1,305 @@
+"""The store of a map: a Zarr folder, made once and without numbers, then filled unit by unit by whoever comes.
+
+Each unit is one shard of every array. The arrays have the parameters as an axis of their own: one file a unit for the
+estimates of all of them. ``status`` is written last and is the mark of a unit that is done. zarr gives a file its name
+when it is complete, so a process that is killed leaves units without the mark, and files ``*.partial`` that nobody
+reads. A unit depends on its own pixels alone: whoever writes it, and however often, writes the same numbers.
+
+The folder's attributes hold the settings that decide the numbers and the identity of the input, as JSON, and their
+digest. Whoever wants to write compares the digest before every unit.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+import xarray as xr
+
+from pbrdf.data.formats.zarr_folder import create_zarr, is_zarr, list_arrays, require_zarr
+from pbrdf.errors import DataError
+from pbrdf.files.atomic import atomic_new_folder
+from pbrdf.files.plain_numbers import json_from_text
+from pbrdf.files.zarr_chunks import StoredArray
+from pbrdf.inversion.map_store.map_source import MapSource
+from pbrdf.inversion.map_store.settings import differences, digest_of, settings_text
+from pbrdf.inversion.map_store.unit_grid import UnitGrid
+
+__all__ = ["COMPLETE", "MARK", "NOT_DONE", "MapStore", "PixelFit", "prepare_store", "stored_attributes"]
+
+#: Version of the layout of stores; another one is refused.
+_LAYOUT = 1
+#: Attributes of the folder: the layout, settings and input as JSON, their digest, and 1 when nothing is missing.
+_VERSION, _SETTINGS, _DIGEST, COMPLETE = "map_layout", "map_settings", "map_digest", "map_complete"
+#: The array that is written last, and its value where nothing is written yet.
+MARK, NOT_DONE = "status", -1
+#: Seconds after which a file that a writer has left unfinished is taken for a killed one's.
+_OLD = 3600.0
+
+
+class PixelFit(Protocol):
+    """What a store needs of :class:`pbrdf.inversion.parameter_map.MapFit`; it can be pickled."""
+
+    @property
+    def settings(self) -> Mapping[str, Any]:
+        """What decides the numbers, as JSON can hold it."""
+
+    @property
+    def dims(self) -> tuple[str, ...]:
+        """The dimensions of the map."""
+
+    def template(self) -> xr.Dataset:
+        """The result without its numbers."""
+
+    def fit_block(
+        self, block: xr.Dataset, progress: Callable[[int, int], None] | None = None
+    ) -> xr.Dataset:
+        """The result of some pixels."""
+
+
+def prepare_store(
+    path: str | Path,
+    fit: PixelFit,
+    source: MapSource,
+    *,
+    shard: Mapping[str, int] | None = None,
+    chunk: Mapping[str, int] | None = None,
+) -> MapStore:
+    """Make the store of a map, or find the one that was begun.
+
+    Parameters
+    ----------
+    path
+        The folder, on a disk that all workers share. Workers may all call this at once: the first makes the store.
+    fit
+        What is fitted, and how.
+    source
+        The pixels.
+    shard, chunk
+        Pixels of a unit and of a chunk along dimensions of the map, see
+        :meth:`pbrdf.inversion.map_store.unit_grid.UnitGrid.of`; a store that is there keeps its own.
+
+    Returns
+    -------
+    MapStore
+        What :func:`pbrdf.inversion.map_store.run_units` and :func:`pbrdf.inversion.map_store.run_on_scheduler` fill.
+
+    Raises
+    ------
+    DataError
+        If zarr is not installed, there is something else of that name, the map that is there was begun with other
+        settings or another input (says which), or the folder cannot be written.
+    """
+    path = Path(path)
+    require_zarr(path)
+    store = MapStore(path, fit, source)
+    if not path.exists():
+        template = fit.template()
+        grid = UnitGrid.of({dim: template.sizes[dim] for dim in fit.dims}, shard, chunk)
+        with atomic_new_folder(path) as folder:
+            _write_template(folder, template, grid, store.settings)
+    store.require_same_settings()
+    return store
+
+
+class MapStore:
+    """A store, and what is needed to go on with it; it can be pickled.
+
+    Attributes
+    ----------
+    path
+        The folder.
+    fit, source
+        What is fitted, and the pixels.
+    settings
+        What decides the numbers: ``fit``, the settings of the fit, and ``input``, the identity of the source.
+    digest
+        Of the settings.
+    """
+
+    def __init__(self, path: Path, fit: PixelFit, source: MapSource) -> None:
+        self.path = path
+        self.fit = fit
+        self.source = source
+        self.settings = {"fit": dict(fit.settings), "input": source.identity()}
+        self.digest = digest_of(self.settings)
+
+    def __getstate__(self) -> dict[str, Any]:
+        opened = ("_arrays", "grid", "_files")
+        return {name: value for name, value in vars(self).items() if name not in opened}
+
+    @cached_property
+    def _arrays(self) -> dict[str, Any]:
+        """The arrays that units fill, the mark last."""
+        import zarr
+
+        group = zarr.open_group(self.path, mode="r+", zarr_format=3, use_consolidated=False)
+        # a chunk that is left out because it is all fill value could not be told from one that was lost
+        found = {
+            name: array.with_config({"write_empty_chunks": True})
+            for name, array in group.arrays()
+            if array.shards is not None and {*self.fit.dims} <= {*array.metadata.dimension_names}
+        }
+        return {**{name: found[name] for name in sorted({*found} - {MARK})}, MARK: found[MARK]}
+
+    @cached_property
+    def _files(self) -> dict[str, StoredArray]:
+        return {name: StoredArray.of(self.path, name) for name in self._arrays}
+
+    @cached_property
+    def grid(self) -> UnitGrid:
+        """The units."""
+        mark = self._arrays[MARK]
+        return UnitGrid(tuple(mark.metadata.dimension_names), mark.shape, mark.shards, mark.chunks)
+
+    def require_same_settings(self) -> None:
+        """Check that the store is one of these settings and this input; raises DataError, which says what differs."""
+        attributes = stored_attributes(self.path)
+        if attributes.get(_DIGEST) == self.digest:
+            return
+        try:
+            stored = json_from_text(str(attributes.get(_SETTINGS)))
+        except ValueError as error:
+            raise DataError(f"{self.path}: the settings of this map are not JSON: it is damaged") from error
+        found = list(differences(stored, json.loads(settings_text(self.settings))))
+        more = f"; and {len(found) - 3} more" if len(found) > 3 else ""
+        raise DataError(
+            f"{self.path}: this map was begun with other settings: {'; '.join(found[:3])}{more}. Choose another folder, "
+            "or what that map was begun with"
+        )
+
+    def is_done(self, number: int) -> bool:
+        """Whether a unit has its mark, and all its files hold what they should."""
+        try:
+            for name in reversed(self._files):
+                array = self._files[name]
+                at = dict(zip(self.grid.dims, self.grid.index(number), strict=True))
+                dims = self._arrays[name].metadata.dimension_names
+                array.require_chunk(tuple(at.get(dim, 0) for dim in dims))
+        except DataError:
+            return False
+        return True
+
+    def missing(self, worker: tuple[int, int] | None = None) -> list[int]:
+        """Numbers of the units that are not done, of those that are a worker's share."""
+        return [number for number in self.grid.share(worker) if not self.is_done(number)]
+
+    def do(self, number: int) -> None:
+        """Fit the pixels of a unit and write what was found.
+
+        Raises
+        ------
+        DataError
+            If the store is another one by now, or cannot be written.
+        """
+        slices = self.grid.slices(number)
+        self.write(number, self.fit.fit_block(self.source.block(slices)))
+
+    def write(self, number: int, result: xr.Dataset) -> None:
+        """Write the result of a unit, its mark last."""
+        slices = self.grid.slices(number)
+        self.require_same_settings()
+        try:
+            for name, array in self._arrays.items():
+                dims = array.metadata.dimension_names
+                values = result[name].transpose(*dims).values
+                place = tuple(slices.get(dim, slice(None)) for dim in dims)
+                wanted = tuple(len(range(*part.indices(size))) for part, size in zip(place, array.shape, strict=True))
+                if values.shape != wanted or values.dtype != array.dtype:
+                    raise AssertionError(
+                        f"{name}: {values.dtype}{values.shape} of a block instead of {array.dtype}{wanted}"
+                    )
+                if name == MARK and (values == NOT_DONE).any():
+                    raise AssertionError(f"{name}: {NOT_DONE} of a pixel that is done")
+                self._remove_damaged(name, number)
+                array[place] = values
+        except OSError as error:
+            raise DataError(
+                f"{self.path}: unit {number} cannot be written: {error.strerror or error}; what is done is kept, and "
+                "the same command goes on from there"
+            ) from error
+
+    def _remove_damaged(self, name: str, number: int) -> None:
+        """Remove a file of a unit that zarr could not read: it looks into a shard that is there."""
+        at = dict(zip(self.grid.dims, self.grid.index(number), strict=True))
+        index = tuple(at.get(dim, 0) for dim in self._arrays[name].metadata.dimension_names)
+        try:
+            self._files[name].require_chunk(index)
+        except DataError:
+            self._files[name].file(index).unlink(missing_ok=True)
+
+    def clear_up(self) -> None:
+        """Remove the unfinished files that killed writers have left; those of an hour may be at work."""
+        for name in self._arrays:
+            for file in (self.path / name).rglob("*.partial"):
+                with suppress(OSError):
+                    if time.time() - file.stat().st_mtime > _OLD:
+                        file.unlink()
+
+
+def stored_attributes(path: Path) -> dict[str, Any]:
+    """Attributes of the store of a map.
+
+    Raises
+    ------
+    DataError
+        If there is none, or it is one of another version.
+    """
+    if not path.exists():
+        raise DataError(f"{path}: there is no such map")
+    if not path.is_dir() or not is_zarr(path):
+        raise DataError(f"{path}: there is something else of that name, which is left alone; choose another")
+    try:
+        content = json_from_text((path / "zarr.json").read_bytes())
+        attributes = content["attributes"]
+        version = attributes[_VERSION]
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise DataError(f"{path}: this Zarr folder is no map of pbrdf, or it is damaged") from error
+    if version != _LAYOUT:
+        raise DataError(f"{path}: this map has the layout {version}, of another version of pbrdf; {_LAYOUT} is known")
+    return attributes
+
+
+def _write_template(folder: Path, template: xr.Dataset, grid: UnitGrid, settings: dict[str, Any]) -> None:
+    """Write all but the numbers of the pixels."""
+    import zarr
+
+    names = [name for name, variable in template.data_vars.items() if {*grid.dims} <= {*variable.dims}]
+    head = template.drop_vars(names)
+    head.attrs = {
+        **{name: _plain(value) for name, value in template.attrs.items()},
+        _VERSION: _LAYOUT,
+        _SETTINGS: settings_text(settings),
+        _DIGEST: digest_of(settings),
+        COMPLETE: 0,
+    }
+    create_zarr(head, folder)
+    group = zarr.open_group(folder, mode="r+", zarr_format=3, use_consolidated=False)
+    units, chunks = dict(zip(grid.dims, grid.shard, strict=True)), dict(zip(grid.dims, grid.chunk, strict=True))
+    for name in names:
+        variable = template[name].variable
+        # the mark has one file for each unit in the order of the map's dimensions
+        dims = grid.dims if name == MARK else variable.dims
+        sizes = {dim: max(size, 1) for dim, size in variable.sizes.items()}
+        group.create_array(
+            str(name),
+            shape=tuple(variable.sizes[dim] for dim in dims),
+            dtype=variable.dtype,
+            shards=tuple(units.get(str(dim), sizes[dim]) for dim in dims),
+            chunks=tuple(chunks.get(str(dim), sizes[dim]) for dim in dims),
+            fill_value=NOT_DONE if name == MARK else np.nan if variable.dtype.kind == "f" else 0,
+            dimension_names=[str(dim) for dim in dims],
+            attributes={name: _plain(value) for name, value in variable.attrs.items()},
+        )
+    list_arrays(folder)
+
+
+def _plain(value: Any) -> Any:
+    """An attribute as JSON can hold it."""
+    return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else value
