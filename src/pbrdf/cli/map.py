@@ -168,8 +168,8 @@ def map_pixels(
     (index.html: open it in a browser), summary.txt and figures. While it runs, MAP-report/quicklook.png shows what is
     done. Interrupted or killed, it goes on where it was when the same command is run again.
 
-    Geometries (angles in degrees, all keys in docs/maps.md): `flat`, with `theta_i=30,theta_r=40,phi=0` after a colon or
-    the angles of `pbrdf reduce --angles`, and `fov=20` for perspective; `sphere:light=POLAR@AZIMUTH` and
+    Geometries (angles in degrees, all keys in docs/maps.md): `flat`, with `theta_i=30,theta_r=40,phi=0` after a colon
+    or the angles of `pbrdf reduce --angles`, and `fov=20` for perspective; `sphere:light=POLAR@AZIMUTH` and
     `cylinder:light=…`, found in the picture; `normals:FILE,light=…`; `angles:FILE`; `mesh:FILE,camera=X/Y/Z,light=…`.
 
     Exit code 3: not one of the measured pixels has converged.

@@ -24,7 +24,7 @@ from pbrdf.errors import DataError
 from pbrdf.files.netcdf_files import open_netcdf
 from pbrdf.inversion.map_store.settings import digest_of
 
-__all__ = ["DatasetSource", "FileSource", "MapSource"]
+__all__ = ["DatasetSource", "FileSource", "MapSource", "file_identity"]
 
 _MIB, _PIECE, _PIECES = 2**20, 2**14, 64
 #: A file of up to so many bytes is digested as a whole.
@@ -162,10 +162,7 @@ class FileSource:
         """Files by their size, variables and the digest of a sample; what is beside them; what is made of them."""
         found: dict[str, Any] = {
             "files": [
-                {
-                    "variables": {str(name): _form(variable) for name, variable in opened.variables.items()},
-                    **_sampled(path),
-                }
+                file_identity(path, opened)
                 for path, opened in zip(self.paths, self._opened, strict=True)
             ],
             "along": self.along,
@@ -178,6 +175,12 @@ class FileSource:
                 "options": dict(self.options),
             }
         return found
+
+
+def file_identity(path: Path, opened: xr.Dataset) -> dict[str, Any]:
+    """Variables and size of a file, and the digest of a sample of it."""
+    forms = {str(name): _form(variable) for name, variable in opened.variables.items()}
+    return {"variables": forms, **_sampled(path)}
 
 
 def _form(variable: xr.Variable) -> str:

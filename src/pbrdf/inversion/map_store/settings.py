@@ -7,7 +7,7 @@ import json
 from collections.abc import Iterator
 from typing import Any
 
-__all__ = ["digest_of", "differences", "settings_text"]
+__all__ = ["differences", "digest_of", "settings_text"]
 
 
 def settings_text(settings: Any) -> str:
