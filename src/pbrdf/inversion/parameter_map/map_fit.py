@@ -36,6 +36,7 @@ from pbrdf.inversion.stack import Stack
 from pbrdf.inversion.starts import sobol_starts
 from pbrdf.inversion.unknowns import bounds_of_each, check_choices, space_of, with_terms
 from pbrdf.models import DoubleGauss, Model
+from pbrdf.optics.stokes import STOKES
 from pbrdf.version import __version__
 
 if TYPE_CHECKING:
@@ -644,6 +645,9 @@ def _form(dataset: xr.Dataset, dims: Sequence[str]) -> xr.Dataset:
             ones = np.ones(shape, dtype=variable.dtype)
             if name == COVARIANCE:
                 ones[:] = np.eye(4)
+                for k, component in enumerate(STOKES):
+                    if component not in dataset:
+                        ones[..., k, :] = ones[..., :, k] = np.nan
             variables[name] = (wanted, ones)
         elif name in _ANGLES and len(own) < len(variable.dims):
             if own != (DIMENSION,):
