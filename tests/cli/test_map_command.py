@@ -330,6 +330,7 @@ def test_data_with_dimensions_of_their_own(run, tmp_path):
         "theta_i": ("geometry", np.rad2deg(theta_i), degree),
         "theta_r": ("geometry", np.rad2deg(theta_r), degree),
         "phi": ("geometry", np.zeros(theta_i.size), degree),
+        "group": ("geometry", np.zeros(theta_i.size, int)),
         "sample": ("sample", [1.0, 2.0, 4.0, 5.0, 7.0], {"units": "mm"}),
     }
     attrs = {
