@@ -348,7 +348,8 @@ class Stack:
         for i in range(size):
             inverse[i, i] = 1.0 / factor[i, i]
             for j in range(i):
-                inverse[i, j] = -sum(factor[i, q] * inverse[q, j] for q in range(j, i)) * inverse[i, i]
+                total = sum(factor[i, q] * inverse[q, j] for q in range(j, i))
+                inverse[i, j] = -total * inverse[i, i]
             for j in range(i + 1):
                 whitening[i, j] = inverse[i, j] / std[j]
         return replace(self, std=std, whitening=whitening, _uploaded={})

@@ -127,7 +127,7 @@ def fit_map(
         labels=labels,
         correlation=correlation,
     )
-    if dataset.chunks:
+    if any(variable.chunks for variable in dataset.variables.values()):
         if prepared.settings["share"]:
             raise DataError(
                 "share: what pixels share is found in several passes over all of them, which Dask arrays would have to "

@@ -644,10 +644,8 @@ def _form(dataset: xr.Dataset, dims: Sequence[str]) -> xr.Dataset:
             shape = [dataset.sizes[d] for d in wanted]
             ones = np.ones(shape, dtype=variable.dtype)
             if name == COVARIANCE:
-                ones[:] = np.eye(4)
-                for k, component in enumerate(STOKES):
-                    if component not in dataset:
-                        ones[..., k, :] = ones[..., :, k] = np.nan
+                known = [n in dataset.data_vars and std_name(n) in dataset.data_vars for n in STOKES]
+                ones[:] = np.where(np.outer(known, known), np.eye(4), np.nan)
             variables[name] = (wanted, ones)
         elif name in _ANGLES and len(own) < len(variable.dims):
             if own != (DIMENSION,):
