@@ -78,7 +78,7 @@ class StandInFit:
         return self._assembled(arrays).transpose(*reversed(self.dims), "parameter")
 
 
-def picture(y=70, x=50, geometries=5):
+def picture(y=40, x=28, geometries=5):
     rng = np.random.default_rng(4)
     values = rng.uniform(0.0, 1.0, (geometries, y, x))
     values[:, :9, :3] = np.nan
@@ -96,7 +96,9 @@ def contents(path: Path) -> dict[str, bytes]:
     return {
         file.relative_to(path).as_posix(): file.read_bytes()
         for file in sorted(path.rglob("*"))
-        if file.is_file() and file.suffix != ".partial" and not any(p.name.endswith(".tmp") for p in file.parents)
+        if file.is_file()
+        and file.suffix != ".partial"
+        and not any(p.name.endswith(".tmp") for p in file.parents)
     }
 
 

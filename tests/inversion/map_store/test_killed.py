@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
 import random
 import signal
+import sys
 import time
+from multiprocessing import forkserver
 
 import pytest
 
@@ -23,6 +26,9 @@ def processes():
     """Processes that start at once, from one that has imported everything."""
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(["stand_in_fit"])
+    with pytest.MonkeyPatch.context() as environment:
+        environment.setenv("PYTHONPATH", os.pathsep.join(filter(None, sys.path)))
+        forkserver.ensure_running()
     return context
 
 
@@ -55,7 +61,7 @@ def test_killed_at_random_moments(tmp_path, processes, undisturbed):
             process = processes.Process(target=run_process, args=(path, 0.004, None, ready))
             process.start()
             assert ready.wait(60)
-            time.sleep(moments.uniform(0.0, 0.12))
+            time.sleep(moments.uniform(0.0, 0.3))
             process.kill()
             process.join()
             if process.exitcode == 0:
@@ -73,7 +79,7 @@ def test_killed_at_random_moments(tmp_path, processes, undisturbed):
 def test_killed_in_the_middle_of_every_file_of_the_first_units(tmp_path, processes, undisturbed, half):
     """Metadata, the arrays of the first unit, its mark, and the next unit."""
     partials = 0
-    for number in range(1, 31, 1 if half else 3):
+    for number in range(1, 31, 2 if half else 5):
         path = tmp_path / f"{number}.zarr"
         process = processes.Process(target=run_killed_in_a_write, args=(path, number, half))
         process.start()
@@ -81,13 +87,13 @@ def test_killed_in_the_middle_of_every_file_of_the_first_units(tmp_path, process
         assert process.exitcode == -signal.SIGKILL
         if path.exists():
             numbers_are(path, undisturbed)
-            with pytest.raises(DataError, match=r"this map is not complete: \d+ of 20 units are missing"):
+            with pytest.raises(DataError, match=r"this map is not complete: \d+ of 6 units are missing"):
                 open_map(path)
             partials += len(list(path.rglob("*.partial")))
         run_units(store_at(path))
         assert contents(path) == undisturbed
         assert open_map(path).attrs["map_complete"] == 1
-    assert partials > 3
+    assert partials
 
 
 @pytest.mark.slow
@@ -113,7 +119,7 @@ def test_files_that_a_killed_writer_left_go_after_an_hour(tmp_path, monkeypatch)
     left.write_bytes(b"half")
     run_units(store)
     assert left.exists()
-    assert open_map(path)["status"].shape == (70, 50)
+    assert open_map(path)["status"].shape == (40, 28)
     later = time.time() + 3700
     monkeypatch.setattr(stand_in_fit.time, "time", lambda: later)
     run_units(store)

@@ -95,7 +95,9 @@ def open_map(path: str | Path, *, partial: bool = False) -> xr.Dataset:
         left = sum(not mark.file(index).exists() for index in mark.indices())
         if not partial:
             what = f"{left} of {mark.count} units are missing" if left else "the last step is missing"
-            raise DataError(f"{path}: this map is not complete: {what}; the command that began it goes on with it")
+            raise DataError(
+                f"{path}: this map is not complete: {what}; the command that began it goes on with it"
+            )
         found = xr.open_dataset(path, engine="zarr", zarr_format=3, consolidated=False, cache=False)
         return found.assign_attrs(units_missing=left)
     try:

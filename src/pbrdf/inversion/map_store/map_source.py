@@ -110,7 +110,9 @@ class FileSource:
             opened = open_zarr(path, cache=False) if path.is_dir() else open_netcdf(path, cache=False)
             for dim in self.dims:
                 if dim not in opened.sizes:
-                    raise DataError(f"{path}: there is no dimension {dim}, but {', '.join(map(str, opened.sizes))}")
+                    raise DataError(
+                        f"{path}: there is no dimension {dim}, but {', '.join(map(str, opened.sizes))}"
+                    )
                 if opened.sizes[dim] != (found or [opened])[0].sizes[dim]:
                     raise DataError(
                         f"{path}: {opened.sizes[dim]} pixels along {dim}, where {self.paths[0]} has "

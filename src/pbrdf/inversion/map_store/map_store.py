@@ -57,9 +57,7 @@ class PixelFit(Protocol):
     def template(self) -> xr.Dataset:
         """The result without its numbers."""
 
-    def fit_block(
-        self, block: xr.Dataset, progress: Callable[[int, int], None] | None = None
-    ) -> xr.Dataset:
+    def fit_block(self, block: xr.Dataset, progress: Callable[[int, int], None] | None = None) -> xr.Dataset:
         """The result of some pixels."""
 
 
@@ -210,7 +208,9 @@ class MapStore:
                 dims = array.metadata.dimension_names
                 values = result[name].transpose(*dims).values
                 place = tuple(slices.get(dim, slice(None)) for dim in dims)
-                wanted = tuple(len(range(*part.indices(size))) for part, size in zip(place, array.shape, strict=True))
+                wanted = tuple(
+                    len(range(*part.indices(size))) for part, size in zip(place, array.shape, strict=True)
+                )
                 if values.shape != wanted or values.dtype != array.dtype:
                     raise AssertionError(
                         f"{name}: {values.dtype}{values.shape} of a block instead of {array.dtype}{wanted}"
@@ -262,7 +262,9 @@ def stored_attributes(path: Path) -> dict[str, Any]:
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise DataError(f"{path}: this Zarr folder is no map of pbrdf, or it is damaged") from error
     if version != _LAYOUT:
-        raise DataError(f"{path}: this map has the layout {version}, of another version of pbrdf; {_LAYOUT} is known")
+        raise DataError(
+            f"{path}: this map has the layout {version}, of another version of pbrdf; {_LAYOUT} is known"
+        )
     return attributes
 
 
@@ -281,7 +283,10 @@ def _write_template(folder: Path, template: xr.Dataset, grid: UnitGrid, settings
     }
     create_zarr(head, folder)
     group = zarr.open_group(folder, mode="r+", zarr_format=3, use_consolidated=False)
-    units, chunks = dict(zip(grid.dims, grid.shard, strict=True)), dict(zip(grid.dims, grid.chunk, strict=True))
+    units, chunks = (
+        dict(zip(grid.dims, grid.shard, strict=True)),
+        dict(zip(grid.dims, grid.chunk, strict=True)),
+    )
     for name in names:
         variable = template[name].variable
         # the mark has one file for each unit in the order of the map's dimensions
