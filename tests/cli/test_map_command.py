@@ -42,8 +42,17 @@ def trial(tmp_path_factory):
     os.chdir(folder)
     try:
         call("measure", *PAINTS, "--patch", 8, "--calibration-error", "none", "-o", "trial")
-        common = ("-p", "trial/polarimeter.toml", "--angles", "trial/angles.csv", "--regions", "trial/regions.toml")
-        call("reduce", "trial/frames", *common, "--no-pictures", "-o", "trial/reduced", "--maps", "zarr", "-q")
+        common = (
+            "-p",
+            "trial/polarimeter.toml",
+            "--angles",
+            "trial/angles.csv",
+            "--regions",
+            "trial/regions.toml",
+        )
+        call(
+            "reduce", "trial/frames", *common, "--no-pictures", "-o", "trial/reduced", "--maps", "zarr", "-q"
+        )
     finally:
         os.chdir(before)
     return folder / "trial"
