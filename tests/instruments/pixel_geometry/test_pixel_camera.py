@@ -10,7 +10,7 @@ from pbrdf.instruments.pixel_geometry.camera import Lamp, PixelCamera
 
 
 def test_lines_of_sight_are_those_of_a_pinhole():
-    """A pixel at the right edge of a field of view of 40° is seen from 20° on its left; above the middle, from below."""
+    """A pixel at the right edge of a field of view of 40° is seen from 20° on its left; above, from below."""
     camera = PixelCamera(field_of_view=math.radians(40.0)).sized(100, 200)
     right = camera.view(np.array(200.0), np.array(50.0))
     assert right == pytest.approx([-math.sin(math.radians(20.0)), 0.0, math.cos(math.radians(20.0))])

@@ -23,11 +23,11 @@ from pbrdf.optics.stokes import STOKES
 __all__ = ["BIN", "as_geometries"]
 
 #: Width of the bins of directions, radians.
-BIN = math.radians(3.0)
+BIN = math.radians(5.0)
 #: Pixels from which on a bin's values are fitted by a surface of second order, which has six terms.
 _FEWEST = 12
 #: Parts of the mean square of a bin's directions, and of the surface's terms, that count as 0.
-_FLAT, _SINGULAR = 1e-8, 1e-10
+_FLAT, _SINGULAR = 1e-8, 1e-3
 
 
 class _Pixels(NamedTuple):
@@ -65,8 +65,8 @@ def as_geometries(
     -------
     dict of str to xarray.Dataset
         By the names of the labels. ``group`` is the series. Bins of twelve pixels or more have the standard error of
-        their scatter about a surface of second order, but no less than that of the pixels' own noise; smaller ones that
-        of the noise, and where it is not known they are left out.
+        their scatter about a surface of second order, but no less than that of the pixels' own noise. The pixels of
+        smaller bins stay by themselves, or, where their noise is not known, are left out.
 
     Raises
     ------
@@ -163,8 +163,9 @@ def _bin_numbers(pixels: _Pixels, width: float) -> np.ndarray:
     """A number for each pixel, the same for those of one bin, counted from 0."""
     theta = np.floor(pixels.angles[:, :2] / width)
     middle = (theta + 0.5) * width
-    # the azimuth counts less the nearer the rays are to the normal
-    turns = np.maximum(1.0, np.round(2.0 * np.pi * np.sqrt(np.sin(middle).prod(axis=-1)) / width))
+    # the azimuth counts less the nearer the rays are to the normal; of one lamp it follows from the zenith angles, but
+    # for the side, so that narrow cells would only cut bins into pieces
+    turns = np.maximum(1.0, np.round(2.0 * np.pi * np.sqrt(np.sin(middle).prod(axis=-1)) / (2.0 * width)))
     # a cell lies about φ = 0: the plane of incidence is not cut
     azimuth = np.mod(np.floor(pixels.angles[:, 2] / (2.0 * np.pi) * turns + 0.5), turns)
     keys = np.column_stack([pixels.series, theta, azimuth]).astype(int)
@@ -174,6 +175,16 @@ def _bin_numbers(pixels: _Pixels, width: float) -> np.ndarray:
 def _binned(pixels: _Pixels, width: float) -> _Pixels:
     """One geometry for each bin."""
     number = _bin_numbers(pixels, width)
+    count = np.bincount(number)
+    small = count[number] < _FEWEST
+    if pixels.covariance is None:
+        if small.all():
+            return _Pixels(pixels.angles[:0], pixels.values[:0], None, pixels.series[:0])
+        pixels, number = _Pixels(*(a if a is None else a[~small] for a in pixels)), number[~small]
+    else:
+        # too few to say how values run on: each pixel by itself
+        number = np.where(small, len(count) + np.arange(len(number)), number)
+    number = np.unique(number, return_inverse=True)[1].ravel()
     count = np.bincount(number)
     first = np.zeros(len(count), dtype=int)
     first[number[::-1]] = np.arange(len(number))[::-1]
@@ -195,19 +206,24 @@ def _binned(pixels: _Pixels, width: float) -> _Pixels:
     size, axes = np.linalg.eigh(mean(apart[:, :, None] * apart[:, None, :]))
     size = np.where(size > _FLAT * width**2, size, np.inf)
     a, b = ((np.einsum("nk,nk->n", apart, axes[number, :, k]) / np.sqrt(size[number, k])) for k in (2, 1))
-    terms = np.stack([np.ones_like(a), a, b, a * a, a * b, b * b], axis=-1)
-    inverse = np.linalg.pinv(mean(terms[:, :, None] * terms[:, None, :]), rcond=_SINGULAR, hermitian=True)
-    rank = np.rint(np.einsum("bij,bji->b", inverse, mean(terms[:, :, None] * terms[:, None, :])))
+    # a and b have the mean square 1: terms that no direction bears out are 0, and leave the plain mean
+    terms = np.stack([np.ones_like(a), a, b, a * a - 1.0, a * b, b * b - 1.0], axis=-1)
+    moments = mean(terms[:, :, None] * terms[:, None, :])
+    inverse = np.linalg.pinv(moments, rcond=_SINGULAR, hermitian=True)
+    rank = np.rint(np.einsum("bij,bji->b", inverse, moments))
     surface = inverse @ mean(terms[:, :, None] * pixels.values[:, None, :])
     left = pixels.values - np.einsum("nt,ntc->nc", terms, surface[number])
-    fitted = count >= _FEWEST
-    values = np.where(fitted[:, None], surface[:, 0], mean(pixels.values))
+    # at the mean direction
+    there = np.array([1.0, 0.0, 0.0, -1.0, 0.0, -1.0])
+    fitted = count > 1
+    values = np.where(fitted[:, None], np.einsum("t,btc->bc", there, surface), pixels.values[first])
     with np.errstate(divide="ignore", invalid="ignore"):
         spread = mean(left[:, :, None] * left[:, None, :]) / (count - rank)[:, None, None]
-    spread *= inverse[:, 0, 0][:, None, None]
+    lever = np.einsum("i,bij,j->b", there, inverse, there)
+    spread *= lever[:, None, None]
     covariance = np.where(fitted[:, None, None], spread, 0.0)
     if pixels.covariance is not None:
-        own = mean(pixels.covariance) / count[:, None, None]
+        own = mean(pixels.covariance) * (np.where(fitted, lever, 1.0) / count)[:, None, None]
         scatters = np.trace(covariance, axis1=1, axis2=2) > np.trace(own, axis1=1, axis2=2)
         covariance = np.where(scatters[:, None, None], covariance, own)
     kept = (np.diagonal(covariance, axis1=1, axis2=2) > 0.0).all(axis=1)

@@ -6,7 +6,7 @@ a few per cent above (below) what stands along the picture's border, and Otsu's 
 (IEEE Trans. Syst. Man Cybern. 9, 62, 1979); of the connected parts, the larger ones are looked at. A circle or two
 parallel lines are searched in the outline points by random samples (Fischler and Bolles, Commun. ACM 24, 381, 1981),
 so that the border of the shadow, which bends inwards, and things beside do not count; then moved to where the
-brightness crosses half of its step, and fitted by least squares of the distances with outliers weighted down.
+brightness steps, and fitted by least squares of the distances with outliers weighted down.
 """
 
 from __future__ import annotations
@@ -35,6 +35,8 @@ _TRIALS = 400
 _ARC, _SHARE, _INSIDE = 0.25, 0.35, 0.9
 #: Half the length of the profile across an outline, in pixels.
 _REACH = 4.0
+#: By which pixels, and the interpolation between them, blur a profile: standard deviation in pixels.
+_BLUR = 0.45
 _SECTORS = 72
 _NOT_ROUND = (
     "no round outline was found in the picture: give the ball's place and radius in pixels, x, y and r (a ball that is "
@@ -312,7 +314,11 @@ def _algebraic_circle(points: np.ndarray) -> np.ndarray:
 
 
 def _crossings(values: np.ndarray, points: np.ndarray, outward: np.ndarray, span: float) -> np.ndarray:
-    """How far outwards of outline points the brightness crosses half of its step, pixels; NaN without a sharp step.
+    """How far outwards of outline points the edge of the sample is, pixels; NaN where it is not sharp.
+
+    Towards the rim of a round body the brightness runs on as the cosine of the incidence does, by a constant and the
+    square root of the distance from the edge; behind the edge it is that of the background. This, blurred by the
+    pixels, is fitted to the profile across the outline with the edge at many places, of which the best is taken.
 
     Where a shadow begins the brightness rises slowly: there, the places at which it is once and three times a small
     part of the picture's range above the background lie apart; at an edge they do not.
@@ -335,11 +341,25 @@ def _crossings(values: np.ndarray, points: np.ndarray, outward: np.ndarray, span
     noise = 1.4826 * np.median(np.abs(profile[:, along > 2.0] - outside[:, None]))
     least = max(_STEP * span, _NOISE * noise)
     first, third = (_outermost(profile, outside + k * least, along) for k in (1.0, 3.0))
-    # one pixel inside of the edge
-    column = np.clip(np.searchsorted(along, first - 1.5), 0, len(along) - 1)
-    inside = np.take_along_axis(profile, column[:, None], axis=1)[:, 0]
-    found = _outermost(profile, 0.5 * (outside + inside), along)
-    return np.where(first - third < 1.0, found, np.nan)
+    shifts = np.linspace(-0.5 * _REACH, 0.5 * _REACH, 81)
+    left = np.array([_left_over(profile, along - shift) for shift in shifts])
+    best = left.argmin(axis=0)
+    i, row = np.clip(best, 1, len(shifts) - 2), np.arange(len(points))
+    before, here, after = left[i - 1, row], left[i, row], left[i + 1, row]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        part = 0.5 * (before - after) / (before - 2.0 * here + after)
+    return np.where((first - third < 1.0) & (best == i), shifts[i] + part * (shifts[1] - shifts[0]), np.nan)
+
+
+def _left_over(profile: np.ndarray, off: np.ndarray) -> np.ndarray:
+    """Sums of squares that a step and a square root leave of profiles (N, M), at distances outwards of the edge."""
+    fine = np.linspace(-2.0 * _REACH, 2.0 * _REACH, 801)
+    blur = np.exp(-0.5 * (fine / _BLUR) ** 2)
+    shapes = [np.ones_like(off)]
+    for shape in (fine < 0.0, np.sqrt(np.maximum(-fine, 0.0))):
+        shapes.append(np.interp(off, fine, np.convolve(shape, blur / blur.sum(), mode="same")))
+    axes = np.linalg.qr(np.stack(shapes, axis=-1))[0]
+    return (profile**2).sum(axis=1) - ((profile @ axes) ** 2).sum(axis=1)
 
 
 def _outermost(profile: np.ndarray, level: np.ndarray, along: np.ndarray) -> np.ndarray:
