@@ -25,7 +25,7 @@ pytestmark = pytest.mark.slow
 PAINT = pbrdf.DoubleGauss(sigma=0.12, n=1.6, a=0.4, k=1.2, b=0.3, t=0.6)
 FIELD = 21.0
 CAMERA = Camera((0.0, -3.0, 0.4), (0.0, 0.0, 0.0), math.radians(FIELD))
-SIZE = (48, 48)
+SIZE = (96, 96)
 RADIUS, INTENSITY = 0.5, 10.0
 #: Equally far from the ball, so that one exposure means one irradiance.
 FAR = 4.0
@@ -66,7 +66,7 @@ def pictures(tmp_path_factory):
         }
         ball = {"type": "sphere", "radius": RADIUS, "bsdf": pbrdf.rendering.bsdf_dict(PAINT)}
         scene = mi.load_dict({"type": "scene", "sensor": CAMERA.to_dict(*SIZE), "ball": ball, "lamp": lamp})
-        rendered[name] = render_stokes(scene, spp=144, depth=2)
+        rendered[name] = render_stokes(scene, spp=64, depth=2)
     exposure = exposure_for(list(rendered.values()), IMAGER)
     frames = picture_frames(rendered, IMAGER, exposure, seed=3)
     path = tmp_path_factory.mktemp("ball") / "stokes.nc"
@@ -74,9 +74,10 @@ def pictures(tmp_path_factory):
     return path, exposure * INTENSITY / FAR**2
 
 
-@pytest.mark.parametrize("mode", ["found in the picture", "a mesh"])
-def test_a_rendered_ball_gives_its_paint_back(run, tmp_path, pictures, mode):
-    """Every parameter within five standard errors, or 2 %: the middle of a pixel stands for what it sees."""
+@pytest.mark.parametrize(("mode", "close"), [("found in the picture", 0.05), ("a mesh", 0.02)])
+def test_a_rendered_ball_gives_its_paint_back(run, tmp_path, pictures, mode, close):
+    """Every parameter within five standard errors, or what is left of a pixel's middle standing for all that it sees, and
+    of an outline that is found to a tenth of a pixel."""
     path, scale = pictures
     lights = f"light={';'.join(map(light, LAMPS.values()))},lamp={FAR},max=70"
     geometry = f"sphere:{lights},fov={FIELD},size={RADIUS}"
@@ -91,12 +92,12 @@ def test_a_rendered_ball_gives_its_paint_back(run, tmp_path, pictures, mode):
     with xr.open_zarr(tmp_path / "ball.zarr", consolidated=False) as opened:
         found = opened.load()
     good = found["status"].values == 0
-    assert good.sum() > 500
+    assert good.sum() > 2000
     for name in ("sigma", "n", "k", "b", "t"):
         one = found.sel(parameter=name)
         value, error = float(one["estimate"].values[good][0]), float(one["standard_error"].values[good][0])
         truth = PAINT.values[name]
-        assert value == pytest.approx(truth, abs=max(5.0 * error, 0.02 * truth)), name
+        assert value == pytest.approx(truth, abs=max(5.0 * error, close * truth)), name
         assert error < 0.1 * truth, name
     a = found.sel(parameter="a")["estimate"].values[good]
     assert np.median(a) == pytest.approx(PAINT.values["a"], rel=0.02)
