@@ -30,6 +30,7 @@ lint: $(TEST_STAMP)
 benchmark: $(TEST_STAMP)
 	$(BIN)/python benchmarks/evaluation.py
 	$(BIN)/python benchmarks/fit.py
+	$(BIN)/python benchmarks/maps.py
 	$(BIN)/python benchmarks/dense_fit.py
 	$(BIN)/python benchmarks/virtual_experiments.py
 	$(BIN)/python benchmarks/coverage.py

@@ -35,9 +35,9 @@ __all__ = ["LOSSES", "Residuals", "Solution", "Status", "costs", "linearise", "s
 #: Iterations of one kernel launch, after which stopped lanes leave the batch. A batch of at most SMALL_BATCH
 #: lanes runs for as many as make LAUNCH evaluations: recording the kernel anew would take longer than idle lanes do.
 ROUNDS, SMALL_BATCH, LAUNCH = 10, 1024, 1 << 18
-#: Up to SMALL_BATCH lanes that make more than SLICE evaluations in an iteration are wide: SLICE evaluations a launch
-#: (about half a second of one core), shared by about WIDTH lanes.
-SLICE, WIDTH = 1 << 15, 2048
+#: Up to SMALL_BATCH lanes that make more than SLICE evaluations in an iteration, over MANY_POINTS points or more, are
+#: wide: SLICE evaluations a launch (about half a second of one core), shared by about WIDTH lanes.
+SLICE, MANY_POINTS, WIDTH = 1 << 15, 128, 2048
 
 #: An unknown stands on a bound that is no farther than this part of its range.
 BOUND_MARGIN = 1e-9
@@ -295,6 +295,7 @@ def _solve(
     while len(lanes) > few:
         active = backend.upload(UInt32, lanes)
         wide = len(lanes) <= SMALL_BATCH and len(lanes) * residuals.points > SLICE
+        wide &= residuals.points >= MANY_POINTS
         state = (_wide_iteration if wide else _iterations)(residuals, state, active, small, limit)
         status = state.status.numpy()
         done = status != Status.RUNNING

@@ -21,8 +21,9 @@ __all__ = ["Ends", "Pixels", "grouped"]
 #: Ends of a search that are the same optimum: in every unknown to this part of its range, in the cost to this part;
 #: and ends of fits.
 SEARCHED, ENDED = (1e-3, 1e-3), (1e-4, 1e-6)
-#: Distinct ends of a search that are looked at in the model's own accuracy, at most.
-LEADERS = 8
+#: Distinct ends of a search that are looked at in the model's own accuracy: those of no more than so many times the best
+#: χ², and so many at most.
+RIVALS, LEADERS = 10.0, 8
 #: Lanes that are searched together, at most.
 LANES = 1 << 16
 
@@ -140,7 +141,9 @@ class Pixels:
         owner = np.repeat(pixels, first.shape[1])
         search = self.search(owner, first.reshape(-1, size))
         u, cost = search.u.reshape(first.shape), search.cost.reshape(first.shape[:2])
-        leaders = grouped(u, cost, high - low, *SEARCHED, LEADERS)
+        with np.errstate(invalid="ignore"):
+            rival = cost <= RIVALS * np.min(np.where(np.isfinite(cost), cost, np.inf), axis=1, keepdims=True)
+        leaders = grouped(u, np.where(rival, cost, np.inf), high - low, *SEARCHED, LEADERS)
         row, column = np.nonzero(leaders >= 0)
         start = u[row, leaders[row, column]]
         solution = self.end(pixels[row], start)
