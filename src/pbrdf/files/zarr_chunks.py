@@ -157,7 +157,7 @@ class StoredArray:
             opened.seek(0 if shards.at_start else stored)
             table = np.frombuffer(opened.read(entries), "<u8").reshape(*inner, 2)
         # chunks that lie beyond the end of the array are not needed
-        reached = tuple(
+        reached: tuple[Any, ...] = tuple(
             slice(min(-(-(length - i * outer) // chunk), most))
             for length, i, outer, chunk, most in zip(
                 self.shape, index, self.chunks, shards.chunks, inner, strict=True
@@ -261,8 +261,8 @@ def _check_array(array: StoredArray) -> int:
     for what, lengths in (("array", array.shape), ("chunks", array.chunks)):
         if array.count and math.prod(lengths) * item > most:
             raise DataError(
-                f"{array.path}: {array.name} declares {what} of {amount(math.prod(lengths) * item)}, which its files of "
-                f"{amount(stored)} cannot hold: it is damaged"
+                f"{array.path}: {array.name} declares {what} of {amount(math.prod(lengths) * item)}, which its files "
+                f"of {amount(stored)} cannot hold: it is damaged"
             )
     return math.prod(array.shape) * item
 
@@ -368,7 +368,7 @@ def _third_version(content: Any) -> tuple[Any, ...]:
 
 
 def _last_codec(names: list[str]) -> str:
-    """What packs the bytes of an array: a codec alone behind ``bytes``, or behind what stores text; ``"other"`` else."""
+    """What packs the bytes of an array: one codec behind ``bytes`` or what stores text; else ``"other"``."""
     if names[0] not in ("bytes", "vlen-utf8", "vlen-bytes") or len(names) > 2:
         return "other"
     return names[1] if len(names) == 2 else "none"

@@ -22,6 +22,7 @@ VARIABLES = {
     "standard_error": (("parameter",), np.float64),
     "chi2": ((), np.float64),
     "optima": ((), np.int16),
+    "starts": ((), np.int16),
     "flags": (("parameter",), np.uint8),
     "status": ((), np.int8),
 }
@@ -71,6 +72,7 @@ class StandInFit:
             "standard_error": np.where(estimate > 0.9, np.nan, 0.1 * estimate),
             "chi2": (values**2).sum(0),
             "optima": np.where(np.isnan(mean), 0, 1 + (mean > 0.6)).astype(np.int16),
+            "starts": np.where(np.isnan(mean), 0, 1 + 63 * (spread > 0.2)).astype(np.int16),
             "flags": (estimate > 0.9).astype(np.uint8),
             "status": status,
         }
@@ -135,3 +137,40 @@ def run_killed_in_a_write(path, number, half):
 
     zarr_files._atomic_write = counted
     run_units(store_at(path))
+
+
+class EndlessSource:
+    """A picture of any size that is nowhere: each block is made when it is asked for."""
+
+    def __init__(self, y, x, geometries):
+        self.shape = (geometries, y, x)
+
+    def outline(self):
+        return xr.Dataset({"I": (("geometry", "y", "x"), np.broadcast_to(0.0, self.shape))})
+
+    def block(self, slices):
+        y, x = (np.arange(self.shape[1 + k])[slices[dim]] for k, dim in enumerate("yx"))
+        g = np.arange(self.shape[0])
+        values = np.cos(g[:, None, None] + 0.37 * y[:, None] + 0.73 * x) ** 2
+        return xr.Dataset({"I": (("geometry", "y", "x"), values)})
+
+    def identity(self):
+        return {"endless": list(self.shape)}
+
+
+def work_on_a_large_map(path, queue):
+    """Begin a map of 10⁸ pixels, do four units of it, and say how much memory and time that took."""
+
+    def peak():
+        (line,) = (line for line in Path("/proc/self/status").read_text().splitlines() if "VmHWM" in line)
+        return int(line.split()[1]) * 1024
+
+    small = store_at(path.with_name("small.zarr"))
+    run_units(small)  # whatever is loaded and started once
+    before, clock = peak(), time.perf_counter()
+    source = EndlessSource(10_000, 10_000, 42)
+    store = prepare_store(path, StandInFit({"y": 10_000, "x": 10_000}), source)
+    planned = time.perf_counter() - clock
+    count = store.grid.count
+    work = run_units(store, worker=(7, count // 4))
+    queue.put((count, work, planned, peak() - before))

@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import os
 import random
 import signal
-import sys
 import time
-from multiprocessing import forkserver
 
 import pytest
 
@@ -19,17 +15,6 @@ from stand_in_fit import contents, run_killed_in_a_write, run_process, store_at
 
 from pbrdf.errors import DataError
 from pbrdf.inversion.map_store import open_map, run_units
-
-
-@pytest.fixture(scope="module")
-def processes():
-    """Processes that start at once, from one that has imported everything."""
-    context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["stand_in_fit"])
-    with pytest.MonkeyPatch.context() as environment:
-        environment.setenv("PYTHONPATH", os.pathsep.join(filter(None, sys.path)))
-        forkserver.ensure_running()
-    return context
 
 
 @pytest.fixture(scope="module")

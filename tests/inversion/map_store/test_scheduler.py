@@ -12,8 +12,9 @@ import warnings
 import pytest
 
 pytest.importorskip("zarr")
-distributed = pytest.importorskip("distributed")
+pytest.importorskip("distributed")
 
+import distributed
 from stand_in_fit import contents, picture, store_at
 
 from pbrdf.errors import DataError

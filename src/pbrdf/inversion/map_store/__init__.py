@@ -5,18 +5,18 @@
 """
 
 from pbrdf.inversion.map_store.finished_map import open_map
-from pbrdf.inversion.map_store.map_source import DatasetSource, FileSource, MapSource
+from pbrdf.inversion.map_store.map_source import DatasetSource, MapSource, file_identity
 from pbrdf.inversion.map_store.map_store import MapStore, PixelFit, prepare_store
 from pbrdf.inversion.map_store.scheduler import run_on_scheduler
 from pbrdf.inversion.map_store.work import Work, run_units
 
 __all__ = [
     "DatasetSource",
-    "FileSource",
     "MapSource",
     "MapStore",
     "PixelFit",
     "Work",
+    "file_identity",
     "open_map",
     "prepare_store",
     "run_on_scheduler",

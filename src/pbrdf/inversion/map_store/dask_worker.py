@@ -54,7 +54,8 @@ class Carrier(WorkerPlugin):
 
 def do_unit(number: int, carrier: str) -> int:
     """Do a unit of the store that the plugin of this name has brought; returns its number."""
-    get_worker().plugins[carrier].do(number)
+    plugin: Any = get_worker().plugins[carrier]
+    plugin.do(number)
     return number
 
 

@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import xarray as xr
 
 from pbrdf.data.formats.zarr_folder import open_zarr
@@ -17,8 +18,10 @@ from pbrdf.inversion.map_store.map_store import COMPLETE, MARK, MapStore, stored
 
 __all__ = ["finish", "open_map"]
 
-#: The array that counts the distinct optima of a pixel, where there is one.
-OPTIMA = "optima"
+#: The arrays that count the distinct optima that were seen at a pixel, and the starts that were followed.
+_COUNTS = ("optima", "starts")
+#: The statuses of pixels that were fitted.
+_FITTED = ("converged", "not_converged")
 
 
 def finish(store: MapStore) -> int:
@@ -40,31 +43,27 @@ def finish(store: MapStore) -> int:
 
 
 def _whole(store: MapStore) -> dict[str, Any]:
-    """Attributes of a whole map: how many pixels have which status, and how many have more than one optimum."""
+    """Attributes of a whole map, as :func:`pbrdf.fit_map` gives them but for the seconds, unit by unit."""
     import zarr
 
-    group = zarr.open_group(store.path, mode="r", zarr_format=3, use_consolidated=False)
-    mark = group[MARK]
-    values = list(mark.attrs["flag_values"])
-    counts = dict.fromkeys(values, 0)
-    several = seen = 0
+    group: Any = zarr.open_group(store.path, mode="r", zarr_format=3, use_consolidated=False)
+    arrays = {name: group[name] for name in (MARK, *_COUNTS) if name in group}
+    meanings = dict(
+        zip(arrays[MARK].attrs["flag_meanings"].split(), arrays[MARK].attrs["flag_values"], strict=True)
+    )
+    fitted = searched = several = 0
     for number in range(store.grid.count):
         slices = store.grid.slices(number)
-        place = tuple(slices[dim] for dim in store.grid.dims)
-        status = mark[place]
-        for value in values:
-            counts[value] += int((status == value).sum())
-        if OPTIMA in group:
-            optima = group[OPTIMA]
-            found = optima[tuple(slices[dim] for dim in optima.metadata.dimension_names)]
-            seen, several = seen + int((found > 0).sum()), several + int((found > 1).sum())
-    meanings = str(mark.attrs["flag_meanings"]).split()
-    attributes: dict[str, Any] = {
-        f"pixels_{meaning}": counts[value] for value, meaning in zip(values, meanings, strict=True)
-    }
-    if seen:
-        attributes["several_optima"] = several / seen
-    return attributes
+        found = {
+            name: array[tuple(slices[dim] for dim in array.metadata.dimension_names)]
+            for name, array in arrays.items()
+        }
+        fitted += int(np.isin(found[MARK], [meanings[name] for name in _FITTED]).sum())
+        if len(arrays) == 1 + len(_COUNTS):
+            optima, starts = (found[name] for name in _COUNTS)
+            searched += int((starts > 1).sum())
+            several += int(((starts > 1) & (optima > 1)).sum())
+    return {"pixels_fitted": fitted, **({"share_of_several_optima": several / searched} if searched else {})}
 
 
 def open_map(path: str | Path, *, partial: bool = False) -> xr.Dataset:

@@ -10,21 +10,18 @@ not count, as machines see it under other names. What is in memory is digested a
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
-from functools import cached_property
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 import xarray as xr
 
-from pbrdf.data.formats.zarr_folder import open_zarr
 from pbrdf.errors import DataError
-from pbrdf.files.netcdf_files import open_netcdf
 from pbrdf.inversion.map_store.settings import digest_of
 
-__all__ = ["DatasetSource", "FileSource", "MapSource", "file_identity"]
+__all__ = ["DatasetSource", "MapSource", "file_identity"]
 
 _MIB, _PIECE, _PIECES = 2**20, 2**14, 64
 #: A file of up to so many bytes is digested as a whole.
@@ -69,118 +66,16 @@ class DatasetSource:
         return _identity(self.dataset)
 
 
-@dataclass(frozen=True, eq=False)
-class FileSource:
-    """Files whose numbers are read when they are asked for, by each process for itself.
-
-    Attributes
-    ----------
-    paths
-        netCDF files or Zarr folders, such as ``stokes.nc`` of ``pbrdf reduce``; several follow each other along
-        `along`, and agree in the other dimensions.
-    turn
-        Makes of the pixels of the files, and those of `beside`, the pixels of a data set of the schema:
-        ``turn(stokes, beside, **options)``; a function of a module, each pixel for itself. None: the files hold such
-        a data set, and `beside`, if there is one, further variables of it.
-    beside
-        What belongs to the pixels besides, such as their geometry, in memory.
-    options
-        Further arguments of `turn`, as JSON can hold them.
-    dims
-        The dimensions of the map.
-    along
-        The dimension of the files along which several follow each other.
-    """
-
-    paths: tuple[Path, ...]
-    turn: Callable[..., xr.Dataset] | None = None
-    beside: xr.Dataset | None = None
-    options: Mapping[str, Any] = field(default_factory=dict)
-    dims: tuple[str, ...] = ("y", "x")
-    along: str = "series"
-
-    def __getstate__(self) -> dict[str, Any]:
-        # each process opens the files for itself
-        return {name: value for name, value in vars(self).items() if name != "_opened"}
-
-    @cached_property
-    def _opened(self) -> list[xr.Dataset]:
-        found = []
-        for path in self.paths:
-            opened = open_zarr(path, cache=False) if path.is_dir() else open_netcdf(path, cache=False)
-            for dim in self.dims:
-                if dim not in opened.sizes:
-                    raise DataError(
-                        f"{path}: there is no dimension {dim}, but {', '.join(map(str, opened.sizes))}"
-                    )
-                if opened.sizes[dim] != (found or [opened])[0].sizes[dim]:
-                    raise DataError(
-                        f"{path}: {opened.sizes[dim]} pixels along {dim}, where {self.paths[0]} has "
-                        f"{found[0].sizes[dim]}"
-                    )
-            found.append(opened)
-        if self.beside is not None:
-            for dim in {*self.dims} & {*self.beside.sizes}:
-                if self.beside.sizes[dim] != found[0].sizes[dim]:
-                    raise DataError(
-                        f"{self.paths[0]}: {found[0].sizes[dim]} pixels along {dim}, where its geometry has "
-                        f"{self.beside.sizes[dim]}"
-                    )
-        return found
-
-    def outline(self) -> xr.Dataset:
-        """The whole input without its numbers: what the first pixel gives, as often as there are pixels."""
-        first = self.block(dict.fromkeys(self.dims, slice(1)))
-        whole = self._opened[0]
-
-        def spread(name: Any, variable: xr.Variable) -> Any:
-            if not {*self.dims} & {*variable.dims}:
-                return variable
-            if name in whole.variables and whole[name].dims == variable.dims == (name,):
-                return whole[name].variable
-            shape = [whole.sizes[dim] if dim in self.dims else variable.sizes[dim] for dim in variable.dims]
-            filled = np.full((), np.nan if variable.dtype.kind == "f" else 0, variable.dtype)
-            return variable.dims, np.broadcast_to(filled, shape), variable.attrs
-
-        outlined = {name: spread(name, variable) for name, variable in first.variables.items()}
-        return xr.Dataset(
-            {name: value for name, value in outlined.items() if name not in first.coords},
-            {name: value for name, value in outlined.items() if name in first.coords},
-            first.attrs,
-        )
-
-    def block(self, slices: Mapping[str, slice]) -> xr.Dataset:
-        """Some pixels, loaded."""
-        parts = [opened.isel(dict(slices)).load() for opened in self._opened]
-        stokes = parts[0] if len(parts) == 1 else xr.concat(parts, self.along, join="exact")
-        beside = self.beside
-        if beside is not None:
-            beside = beside.isel({dim: part for dim, part in slices.items() if dim in beside.sizes})
-        if self.turn is not None:
-            return self.turn(stokes, beside, **self.options)
-        return stokes if beside is None else stokes.merge(beside, join="exact")
-
-    def identity(self) -> dict[str, Any]:
-        """Files by their size, variables and the digest of a sample; what is beside them; what is made of them."""
-        found: dict[str, Any] = {
-            "files": [
-                file_identity(path, opened)
-                for path, opened in zip(self.paths, self._opened, strict=True)
-            ],
-            "along": self.along,
-        }
-        if self.beside is not None:
-            found["beside"] = _identity(self.beside)
-        if self.turn is not None:
-            found["turn"] = {
-                "function": f"{self.turn.__module__}.{self.turn.__qualname__}",
-                "options": dict(self.options),
-            }
-        return found
-
-
 def file_identity(path: Path, opened: xr.Dataset) -> dict[str, Any]:
-    """Variables and size of a file, and the digest of a sample of it."""
+    """Variables and size of a file, and the digest of a sample of it.
+
+    Parameters
+    ----------
+    path
+        A file, or the folder of a Zarr store.
+    opened
+        What it holds; no numbers are read.
+    """
     forms = {str(name): _form(variable) for name, variable in opened.variables.items()}
     return {"variables": forms, **_sampled(path)}
 
@@ -197,7 +92,7 @@ def _identity(dataset: xr.Dataset) -> dict[str, Any]:
         if values.dtype.kind in "OUT":
             digest = digest_of(values.tolist())
         else:
-            digest = hashlib.sha256(np.ascontiguousarray(values)).hexdigest()
+            digest = hashlib.sha256(np.ascontiguousarray(values).tobytes()).hexdigest()
         variables[str(name)] = {"form": _form(variable), "digest": digest}
     attrs = {
         str(name): np.asarray(value).tolist() if not isinstance(value, (str, list, dict)) else value

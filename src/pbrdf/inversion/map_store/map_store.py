@@ -137,7 +137,7 @@ class MapStore:
         """The arrays that units fill, the mark last."""
         import zarr
 
-        group = zarr.open_group(self.path, mode="r+", zarr_format=3, use_consolidated=False)
+        group: Any = zarr.open_group(self.path, mode="r+", zarr_format=3, use_consolidated=False)
         # a chunk that is left out because it is all fill value could not be told from one that was lost
         found = {
             name: array.with_config({"write_empty_chunks": True})
@@ -168,18 +168,15 @@ class MapStore:
         found = list(differences(stored, json.loads(settings_text(self.settings))))
         more = f"; and {len(found) - 3} more" if len(found) > 3 else ""
         raise DataError(
-            f"{self.path}: this map was begun with other settings: {'; '.join(found[:3])}{more}. Choose another folder, "
-            "or what that map was begun with"
+            f"{self.path}: this map was begun with other settings: {'; '.join(found[:3])}{more}. Choose another "
+            "folder, or what that map was begun with"
         )
 
     def is_done(self, number: int) -> bool:
         """Whether a unit has its mark, and all its files hold what they should."""
         try:
             for name in reversed(self._files):
-                array = self._files[name]
-                at = dict(zip(self.grid.dims, self.grid.index(number), strict=True))
-                dims = self._arrays[name].metadata.dimension_names
-                array.require_chunk(tuple(at.get(dim, 0) for dim in dims))
+                self._files[name].require_chunk(self._place(name, number))
         except DataError:
             return False
         return True
@@ -225,10 +222,14 @@ class MapStore:
                 "the same command goes on from there"
             ) from error
 
+    def _place(self, name: str, number: int) -> tuple[int, ...]:
+        """Place of a unit's file among those of an array."""
+        at = dict(zip(self.grid.dims, self.grid.index(number), strict=True))
+        return tuple(at.get(dim, 0) for dim in self._arrays[name].metadata.dimension_names)
+
     def _remove_damaged(self, name: str, number: int) -> None:
         """Remove a file of a unit that zarr could not read: it looks into a shard that is there."""
-        at = dict(zip(self.grid.dims, self.grid.index(number), strict=True))
-        index = tuple(at.get(dim, 0) for dim in self._arrays[name].metadata.dimension_names)
+        index = self._place(name, number)
         try:
             self._files[name].require_chunk(index)
         except DataError:
@@ -282,7 +283,7 @@ def _write_template(folder: Path, template: xr.Dataset, grid: UnitGrid, settings
         COMPLETE: 0,
     }
     create_zarr(head, folder)
-    group = zarr.open_group(folder, mode="r+", zarr_format=3, use_consolidated=False)
+    group: Any = zarr.open_group(folder, mode="r+", zarr_format=3, use_consolidated=False)
     units, chunks = (
         dict(zip(grid.dims, grid.shard, strict=True)),
         dict(zip(grid.dims, grid.chunk, strict=True)),

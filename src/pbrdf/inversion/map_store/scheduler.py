@@ -69,7 +69,8 @@ def run_on_scheduler(
                     carrier=carrier,
                     key=[f"{carrier}-unit-{number}" for number in missing],
                     retries=_RETRIES,
-                )
+                ),
+                loop=client.loop,
             )
             for number, future in enumerate(ended, start=1):
                 if future.status != "finished":

@@ -42,7 +42,7 @@ def differences(stored: Any, ours: Any, name: str = "") -> Iterator[str]:
 
 #: What stands for a setting that is not there.
 _ABSENT = "(none)"
-_LONGEST = 60
+_LONGEST = 40
 
 
 def _shown(value: Any) -> str:

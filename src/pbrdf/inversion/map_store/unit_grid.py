@@ -27,7 +27,7 @@ class UnitGrid:
     sizes
         Pixels along each.
     shard, chunk
-        Pixels of a unit and of a chunk along each; a unit holds whole chunks, and the last one may reach beyond the map.
+        Pixels of a unit and of a chunk along each; a unit holds whole chunks, the last one may reach beyond the map.
     """
 
     dims: tuple[str, ...]
