@@ -44,7 +44,7 @@ def painted(model, geometry, *, noise=0.0, seed=0, scale=1.0):
     return xr.Dataset(data, coords)
 
 
-def shaded(geometry, rows, columns, *, background=0.02, noise=0.003, seed=0, fine=4):
+def shaded(geometry, rows, columns, *, background=0.02, noise=0.003, seed=0, fine=3):
     """Pictures of a matt sample, each pixel the mean of finer ones: what the finding of outlines is tried on."""
     place = [(np.arange(n * fine) + 0.5) / fine - 0.5 for n in (columns, rows)]
     found = geometry.pixels(*place)

@@ -27,6 +27,10 @@ if TYPE_CHECKING:
     from pbrdf.data.readers import register_reader
     from pbrdf.instruments.calibration.instrument_calibration import calibrate_instrument
     from pbrdf.instruments.goniometer.protocols import Protocol
+    from pbrdf.instruments.pixel_geometry.geometries import as_geometries
+    from pbrdf.instruments.pixel_geometry.labels import read_labels
+    from pbrdf.instruments.pixel_geometry.map_dataset import map_dataset
+    from pbrdf.instruments.pixel_geometry.text_form import parse_pixel_geometry
     from pbrdf.instruments.polarimeter.detector import Detector
     from pbrdf.instruments.polarimeter.instrument import Instrument
     from pbrdf.instruments.polarimeter.instrument_files import load_instrument, save_instrument
@@ -145,6 +149,11 @@ _HOME = {
     "reduce": "pbrdf.instruments.reduction.reduce",
     "goniometric_datasets": "pbrdf.instruments.reduction.goniometric_datasets",
     "polarization": "pbrdf.instruments.polarimeter.polarization_errors",
+    # the pixels of a picture as geometries
+    "parse_pixel_geometry": "pbrdf.instruments.pixel_geometry.text_form",
+    "map_dataset": "pbrdf.instruments.pixel_geometry.map_dataset",
+    "as_geometries": "pbrdf.instruments.pixel_geometry.geometries",
+    "read_labels": "pbrdf.instruments.pixel_geometry.labels",
     # goniometer: what to measure, and the measurement simulated
     "Protocol": "pbrdf.instruments.goniometer.protocols",
     "plan": "pbrdf.planning.plan",
@@ -182,6 +191,7 @@ __all__ = [
     "VirtualExperiment",
     "__version__",
     "aolp",
+    "as_geometries",
     "bootstrap",
     "bsdf_dict",
     "calibrate_instrument",
@@ -207,14 +217,17 @@ __all__ = [
     "load_model",
     "load_paint",
     "make_dataset",
+    "map_dataset",
     "merit",
     "open_experiment",
+    "parse_pixel_geometry",
     "plan",
     "plausibility",
     "polarization",
     "preset",
     "profile",
     "read",
+    "read_labels",
     "reduce",
     "reduce_frames",
     "register",

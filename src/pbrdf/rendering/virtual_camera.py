@@ -16,6 +16,7 @@ from pbrdf.errors import DataError
 from pbrdf.instruments.frames.frames import ArrayFrames, Frames
 from pbrdf.instruments.frames.mosaic import MosaicFrames
 from pbrdf.instruments.goniometer.rays import angles_of
+from pbrdf.instruments.pixel_geometry.geometry import plane_rotation
 from pbrdf.instruments.polarimeter.instrument import Instrument
 from pbrdf.instruments.reduction.stokes_image import StokesImage
 from pbrdf.instruments.reduction.surface_axes import to_surface_axes
@@ -75,8 +76,9 @@ def pixel_geometry(scene: Any, lamp: Sequence[float]) -> PixelGeometry:
     si = scene.ray_intersect(ray)
     target = mi.Point3f([float(c) for c in lamp])
     lit = si.is_valid() & ~scene.ray_test(si.spawn_ray_to(target))
-    upright = sensor.world_transform() @ mi.Vector3f(0.0, 1.0, 0.0)
-    dr.eval(ray, si, lit, upright)
+    # Mitsuba's camera looks along +z with x to the left
+    axes = [sensor.world_transform() @ mi.Vector3f(*axis) for axis in ((-1, 0, 0), (0, 1, 0), (0, 0, -1))]
+    dr.eval(ray, si, lit, axes)
 
     def column(vector: Any) -> np.ndarray:
         return np.broadcast_to(np.array(vector, dtype=float).T, (rows * columns, 3))
@@ -87,11 +89,8 @@ def pixel_geometry(scene: Any, lamp: Sequence[float]) -> PixelGeometry:
     to_lamp = to_lamp / distance[:, None]
     good = np.array(lit) & ((normal * seen).sum(-1) > 0.0) & ((normal * to_lamp).sum(-1) > 0.0)
     theta_i, theta_r, phi = angles_of(normal, to_lamp, seen)
-    # the light travels along `seen`: s = k × n, p = s × k, and the axes of the picture about the same ray
-    p = np.cross(np.cross(seen, normal), seen)
-    x = np.cross(-seen, column(upright))
-    y = np.cross(seen, x)
-    plane = np.arctan2((p * y).sum(-1), (p * x).sum(-1))
+    camera = np.stack([np.array(axis, dtype=float).ravel() for axis in axes], axis=-1)
+    plane = plane_rotation(normal @ camera, seen @ camera, to_lamp @ camera)
     names = np.full(rows * columns, "", dtype=object)
     for shape in scene.shapes():
         names[np.array(si.shape == mi.ShapePtr(shape))] = shape.id()

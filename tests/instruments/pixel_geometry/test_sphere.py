@@ -70,10 +70,10 @@ def test_it_is_found(camera, lamps, close):
     """Wholly lit by two lamps in turn to a twentieth of a pixel; from one side, where only a part of the outline is to
     be seen, to a tenth."""
     true = Sphere(
-        x=130.3, y=91.8, r=60.4, lamps=lamps, camera=camera.sized(200, 260), max_zenith=0.5 * math.pi
+        x=80.3, y=56.8, r=40.4, lamps=lamps, camera=camera.sized(120, 150), max_zenith=0.5 * math.pi
     )
-    found = Sphere(lamps=lamps, camera=camera).located(shaded(true, 200, 260))
-    assert (found.x, found.y, found.r) == pytest.approx((130.3, 91.8, 60.4), abs=close)
+    found = Sphere(lamps=lamps, camera=camera).located(shaded(true, 120, 150))
+    assert (found.x, found.y, found.r) == pytest.approx((80.3, 56.8, 40.4), abs=close)
     about = found.pixels(np.arange(4), np.arange(4)).attrs
     assert about["found"] == 1 and about["r"] == found.r
     assert about["found_residual_pixels"] < 0.3

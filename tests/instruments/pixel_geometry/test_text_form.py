@@ -1,9 +1,12 @@
 """Geometries in words."""
 
 import math
+import pickle
 from pathlib import Path
 
+import numpy as np
 import pytest
+from pixel_helpers import blank
 
 from pbrdf.errors import DataError
 from pbrdf.instruments.pixel_geometry.camera import Lamp, PixelCamera
@@ -94,6 +97,16 @@ def test_mistakes_are_named(text, words):
         pytest.importorskip("mitsuba")
     with pytest.raises(DataError, match=words):
         parse_pixel_geometry(text)
+
+
+@pytest.mark.parametrize(
+    "text", ["flat:theta_i=30,theta_r=40,phi=0,reference=90", "sphere:x=1,y=2,r=3,light=30@90"]
+)
+def test_a_located_geometry_travels_to_other_processes(text):
+    geometry = parse_pixel_geometry(text).located(blank(4, 5))
+    again = pickle.loads(pickle.dumps(geometry))
+    assert again == geometry
+    assert again.pixels(np.arange(5), np.arange(4)).identical(geometry.pixels(np.arange(5), np.arange(4)))
 
 
 def test_kinds_are_listed():

@@ -180,7 +180,9 @@ def _binned(pixels: _Pixels, width: float) -> _Pixels:
     if pixels.covariance is None:
         if small.all():
             return _Pixels(pixels.angles[:0], pixels.values[:0], None, pixels.series[:0])
-        pixels, number = _Pixels(*(a if a is None else a[~small] for a in pixels)), number[~small]
+        kept = ~small
+        pixels = _Pixels(pixels.angles[kept], pixels.values[kept], None, pixels.series[kept])
+        number = number[kept]
     else:
         # too few to say how values run on: each pixel by itself
         number = np.where(small, len(count) + np.arange(len(number)), number)
@@ -194,6 +196,11 @@ def _binned(pixels: _Pixels, width: float) -> _Pixels:
         sums = np.stack([np.bincount(number, column) for column in flat.T], axis=-1)
         return (sums / count[:, None]).reshape(-1, *values.shape[1:])
 
+    def products(left: np.ndarray, right: np.ndarray) -> np.ndarray:
+        """Means of all products of columns, one at a time: pixels are many."""
+        columns = [[np.bincount(number, a * b) for b in right.T] for a in left.T]
+        return np.moveaxis(np.array(columns) / count, -1, 0)
+
     # from the first of each bin, so that the turn from 360° to 0° does no harm
     off = pixels.angles - pixels.angles[first][number]
     off[:, 2] = np.mod(off[:, 2] + np.pi, 2.0 * np.pi) - np.pi
@@ -203,22 +210,22 @@ def _binned(pixels: _Pixels, width: float) -> _Pixels:
     apart = off - shift[number]
     apart[:, 2] *= weight[number]
     # across the bin: the two directions in which it extends most, in its own standard deviations
-    size, axes = np.linalg.eigh(mean(apart[:, :, None] * apart[:, None, :]))
+    size, axes = np.linalg.eigh(products(apart, apart))
     size = np.where(size > _FLAT * width**2, size, np.inf)
     a, b = ((np.einsum("nk,nk->n", apart, axes[number, :, k]) / np.sqrt(size[number, k])) for k in (2, 1))
     # a and b have the mean square 1: terms that no direction bears out are 0, and leave the plain mean
     terms = np.stack([np.ones_like(a), a, b, a * a - 1.0, a * b, b * b - 1.0], axis=-1)
-    moments = mean(terms[:, :, None] * terms[:, None, :])
+    moments = products(terms, terms)
     inverse = np.linalg.pinv(moments, rcond=_SINGULAR, hermitian=True)
     rank = np.rint(np.einsum("bij,bji->b", inverse, moments))
-    surface = inverse @ mean(terms[:, :, None] * pixels.values[:, None, :])
+    surface = inverse @ products(terms, pixels.values)
     left = pixels.values - np.einsum("nt,ntc->nc", terms, surface[number])
     # at the mean direction
     there = np.array([1.0, 0.0, 0.0, -1.0, 0.0, -1.0])
     fitted = count > 1
     values = np.where(fitted[:, None], np.einsum("t,btc->bc", there, surface), pixels.values[first])
     with np.errstate(divide="ignore", invalid="ignore"):
-        spread = mean(left[:, :, None] * left[:, None, :]) / (count - rank)[:, None, None]
+        spread = products(left, left) / (count - rank)[:, None, None]
     lever = np.einsum("i,bij,j->b", there, inverse, there)
     spread *= lever[:, None, None]
     covariance = np.where(fitted[:, None, None], spread, 0.0)
