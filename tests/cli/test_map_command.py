@@ -254,12 +254,12 @@ def test_what_pixels_share_is_one_number_a_label_and_is_kept(at_trial, tmp_path,
 @pytest.fixture
 def ball(tmp_path):
     """A painted ball in one picture a lamp, and where it is."""
-    geometry = "sphere:x=20,y=16,r=14,light=40@90;40@210;40@330"
+    geometry = "sphere:x=20,y=16,r=14,light=25@90;45@210;65@330"
     from pbrdf.instruments.pixel_geometry.text_form import parse_pixel_geometry
 
     paint = pbrdf.DoubleGauss(sigma=0.12, n=1.6, a=0.4, k=1.2, b=0.3, t=0.6)
     pictures = painted(
-        paint, parse_pixel_geometry(geometry).of(blank(32, 40, 3)), noise=2e-4, scale=1000.0, seed=4
+        paint, parse_pixel_geometry(geometry).of(blank(32, 40, 3)), noise=0.2, scale=1000.0, seed=4
     )
     pictures.to_netcdf(tmp_path / "ball.nc", engine="h5netcdf")
     return paint, geometry
@@ -416,7 +416,7 @@ def test_the_film_polarisers_as_far_as_one_picture_goes(run, tmp_path, measured)
         (("ball.nc", "-g", "{}", "--fix", "m=1"), "has no parameter"),
         (
             ("ball.nc", "-g", "{}", "--labels", "small.png"),
-            "small.png: has 3 × 3 pixels, the picture 32 × 40",
+            "small.png",
         ),
         (("ball.nc", "-g", "{}", "--labels", "none.toml"), "none.toml"),
         (("ball.nc", "-g", "{}", "-g", "{}"), "2 geometries for 1 files"),

@@ -76,8 +76,8 @@ def pictures(tmp_path_factory):
 
 @pytest.mark.parametrize(("mode", "close"), [("found in the picture", 0.05), ("a mesh", 0.02)])
 def test_a_rendered_ball_gives_its_paint_back(run, tmp_path, pictures, mode, close):
-    """Every parameter within five standard errors, or what is left of a pixel's middle standing for all that it sees, and
-    of an outline that is found to a tenth of a pixel."""
+    """Every parameter within five standard errors, or what the middle of a pixel standing for all of it costs, and an
+    outline that is found to a tenth of a pixel."""
     path, scale = pictures
     lights = f"light={';'.join(map(light, LAMPS.values()))},lamp={FAR},max=70"
     geometry = f"sphere:{lights},fov={FIELD},size={RADIUS}"

@@ -1,4 +1,4 @@
-"""``pbrdf map``: a model fitted to every pixel of a picture, into a store that is gone on with after an interruption."""
+"""``pbrdf map``: a model fitted to every pixel of a picture, into a store that is gone on with after a kill."""
 
 from __future__ import annotations
 
@@ -55,8 +55,8 @@ def map_pixels(
         list[Path],
         typer.Argument(
             metavar="STOKES",
-            help="Stokes pictures (stokes.nc or .zarr of `pbrdf reduce`), data with dimensions beside geometry, or with "
-            "--polarimeter raw frames. Several: more series of the same pixels.",
+            help="Stokes pictures (stokes.nc or .zarr of `pbrdf reduce`), data with dimensions beside geometry, or "
+            "with --polarimeter raw frames. Several: more series of the same pixels.",
         ),
     ],
     geometry: Annotated[
@@ -64,8 +64,8 @@ def map_pixels(
         typer.Option(
             "--geometry",
             "-g",
-            help="Geometry of the pixels of Stokes pictures: flat, sphere, cylinder, normals, angles or mesh, see below; "
-            "repeat it for one a file.",
+            help="Geometry of the pixels of Stokes pictures: flat, sphere, cylinder, normals, angles or mesh, see "
+            "above; repeat it for one a file.",
             metavar="KIND[:…]",
         ),
     ] = None,

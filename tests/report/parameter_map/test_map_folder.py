@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from example_maps import example_map
 
+from pbrdf.inversion.map_store.unit_grid import UnitGrid
 from pbrdf.report.parameter_map.folder import write_map_report
 from pbrdf.report.parameter_map.quicklook import QuickLook
 from pbrdf.report.parameter_map.subject import MapReport
@@ -53,30 +54,50 @@ def test_without_figures_no_plotting_library_is_asked(tmp_path, monkeypatch):
     assert "open_dataset" in page
 
 
+class Store:
+    """What a quick look needs of a store that is being filled."""
+
+    def __init__(self, path, grid):
+        self.path, self.grid, self.done = path, grid, set()
+
+    def is_done(self, number):
+        return number in self.done
+
+
 def test_the_quick_look_fills_and_is_drawn_now_and_then(tmp_path, monkeypatch):
-    clock = [100.0]
+    clock, drawn = [100.0], []
     monkeypatch.setattr("pbrdf.report.parameter_map.quicklook.time.monotonic", lambda: clock[0])
-    whole = example_map((40, 40), parameters=2, cause=False)
-    stored = whole.copy(deep=True)
-    stored["status"][20:] = -1
-    drawn = []
     monkeypatch.setattr(
         "pbrdf.report.style.save_figure",
         lambda figure, path: (drawn.append(figure), path.write_bytes(b"png")),
     )
-    look = QuickLook(tmp_path / "look.png", "paint", every=5.0)
-    look.update(stored, {"y": slice(0, 20)})
+    whole = example_map((40, 40), parameters=2, cause=False)
+    stored = whole.copy(deep=True)
+    stored["status"][:] = -1
+    monkeypatch.setattr("pbrdf.report.parameter_map.quicklook.open_map", lambda path, partial: stored)
+    store = Store(tmp_path / "paint.zarr", UnitGrid.of({"y": 40, "x": 40}, {"y": 10, "x": 40}, {"y": 10, "x": 40}))
+    look = QuickLook(store, tmp_path / "report" / "look.png", every=5.0)
+
+    def missing():
+        return np.ma.getmaskarray(drawn[-1].axes[0].images[0].get_array()).mean()
+
+    look()
     assert not drawn
-    clock[0] += 6.0
-    look.update(stored, {"y": slice(20, 30)})
-    assert len(drawn) == 1
-    assert (tmp_path / "look.png").read_bytes() == b"png"
-    pending = np.ma.getmaskarray(drawn[0].axes[0].images[0].get_array())
-    assert pending.mean() == 0.5
+    for rows, number in ((slice(0, 10), 0), (slice(20, 30), 2)):
+        stored["status"][rows] = 0
+        store.done.add(number)
+    look()
+    assert (tmp_path / "report" / "look.png").read_bytes() == b"png"
+    assert missing() == 0.5
+    assert "2 of 4 units are done" in drawn[-1].get_suptitle()
+    stored["status"][:] = 0
+    store.done = {0, 1, 2, 3}
     clock[0] += 1.0
-    look.update(whole, {"y": slice(20, 40)})
+    look()
     assert len(drawn) == 1
-    look.draw()
-    look.draw()
+    clock[0] += 5.0
+    look()
+    assert missing() == 0.0
+    clock[0] += 50.0
+    look()
     assert len(drawn) == 2
-    assert not np.ma.getmaskarray(drawn[1].axes[0].images[0].get_array()).any()

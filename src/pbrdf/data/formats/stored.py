@@ -126,8 +126,7 @@ def _understood(stored: xr.Dataset, path: Path) -> xr.Dataset:
             raise
         except (TypeError, ValueError) as error:
             raise DataError(f"{path}: {name} cannot be used as it is stored: {error}") from error
-    ds = xr.Dataset(data, coords, attrs)
-    return ds
+    return xr.Dataset(data, coords, attrs)
 
 
 def _from_file_units(path: Path, name: str, array: xr.DataArray) -> NDArray[Any]:

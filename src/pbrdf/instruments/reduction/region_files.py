@@ -33,7 +33,7 @@ from pbrdf.files.text import read_toml
 from pbrdf.instruments.frames.pictures import SUFFIXES, open_pictures
 from pbrdf.instruments.reduction.regions import Ellipse, LabelRegion, Polygon, Rectangle, Region
 
-__all__ = ["read_labels", "read_regions", "region_from_text"]
+__all__ = ["read_regions", "region_from_text"]
 
 #: More values than this in a picture of labels are a photograph.
 _MOST_LABELS = 1000
@@ -164,40 +164,6 @@ def _from_csv(path: Path) -> dict[str, Region]:
         except DataError as error:
             raise DataError(f"{row.line}: {error}") from error
     return regions
-
-
-def read_labels(path: Path, rows: int, columns: int) -> np.ndarray:
-    """The number of the region that each pixel belongs to, 0 for none.
-
-    Parameters
-    ----------
-    path
-        A picture of labels, whose numbers these are; or other regions, counted from 1 in their order: where they overlap
-        the last one counts.
-    rows, columns
-        Of the picture that the regions are in.
-
-    Returns
-    -------
-    array
-        Whole numbers, shape (rows, columns).
-
-    Raises
-    ------
-    DataError
-        Names the file, and what is wrong in it.
-    """
-    if path.suffix.lower() in SUFFIXES:
-        labels = _labels(path)
-        if labels.shape != (rows, columns):
-            raise DataError(
-                f"{path}: has {labels.shape[0]} × {labels.shape[1]} pixels, the picture {rows} × {columns}"
-            )
-        return labels
-    labels = np.zeros((rows, columns), dtype=np.uint16)
-    for number, region in enumerate(read_regions(path).values(), start=1):
-        labels[region.mask(0, rows, columns)] = number
-    return labels
 
 
 def _labels(path: Path) -> np.ndarray:

@@ -26,8 +26,8 @@ from pbrdf.errors import DataError
 from pbrdf.files.digest import sha256_of
 from pbrdf.files.netcdf_files import open_netcdf
 from pbrdf.instruments.pixel_geometry.geometry import PixelGeometry
+from pbrdf.instruments.pixel_geometry.labels import read_labels
 from pbrdf.instruments.pixel_geometry.map_dataset import map_block
-from pbrdf.instruments.reduction.region_files import read_labels
 from pbrdf.inversion.map_store.map_source import file_identity
 from pbrdf.inversion.parameter_map.map_fit import LABEL
 from pbrdf.optics.stokes import STOKES
@@ -82,7 +82,7 @@ class PictureSource:
         scale
             As the attribute.
         labels
-            A file of :func:`~pbrdf.instruments.reduction.region_files.read_labels`.
+            A file of :func:`~pbrdf.instruments.pixel_geometry.labels.read_labels`.
 
         Raises
         ------
@@ -122,7 +122,7 @@ class PictureSource:
                 raise DataError(
                     f"{labels}: regions are parts of pictures over y and x, not of {_in_words(found[0])}"
                 )
-            parts = read_labels(labels, found[0]["y"], found[0]["x"])
+            parts = read_labels(labels, found[0]["y"], found[0]["x"]).values
         return cls(tuple(paths), located, scale, parts, found[0], opened)
 
     def __getstate__(self) -> dict[str, Any]:
