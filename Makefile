@@ -39,6 +39,7 @@ benchmark: $(TEST_STAMP)
 	$(BIN)/python benchmarks/domain.py
 	$(BIN)/python benchmarks/domain.py --single
 	$(BIN)/python benchmarks/read_csv.py
+	$(BIN)/python benchmarks/map_store.py
 
 # 20 000 damaged inputs of every kind: none may end in anything but data or a sentence (about a quarter of an hour)
 fuzz: $(TEST_STAMP)

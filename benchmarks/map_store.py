@@ -2,9 +2,9 @@
 
     python benchmarks/map_store.py [--turns N] [--side PIXELS …]
 
-A unit of a map of six parameters, side × side pixels of random numbers, is written in four ways that take turns, each
-into a store of its own: as :mod:`pbrdf.inversion.map_store` does it, arrays with the parameters as an axis, the check of
-the settings before and the mark last; the same numbers as twelve variables, straight through zarr; and both through
+A unit of a map of six parameters, side × side pixels of random numbers, is written in four ways that take turns: as
+:mod:`pbrdf.inversion.map_store` does it, arrays with the parameters as an axis, the check of the settings before and
+the mark last; the same numbers as twelve variables, straight through zarr; and both through
 ``xarray.Dataset.to_zarr(region=…)``. Printed are medians and quartiles of the time of a unit, and ratios to the first.
 """
 
@@ -128,7 +128,9 @@ def prepared(folder: Path, side: int) -> tuple[MapStore, dict[str, Callable[[int
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--turns", type=int, default=UNITS**2)
     parser.add_argument("--side", type=int, nargs="+", default=[64, 256])
     options = parser.parse_args()

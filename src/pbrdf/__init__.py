@@ -62,6 +62,7 @@ if TYPE_CHECKING:
     from pbrdf.inversion.bootstrap import bootstrap
     from pbrdf.inversion.contour import contour
     from pbrdf.inversion.identifiability import identifiability
+    from pbrdf.inversion.map_store import open_map
     from pbrdf.inversion.model_comparison import compare_models as compare
     from pbrdf.inversion.parameter_map import MapFit, fit_map
     from pbrdf.inversion.profile import profile
@@ -120,6 +121,7 @@ _HOME = {
     "Nuisance": "pbrdf.inversion",
     "HoldOut": "pbrdf.inversion",
     "load_fit": "pbrdf.inversion.stored_result",
+    "open_map": "pbrdf.inversion.map_store",
     # how far to trust a fit
     "profile": "pbrdf.inversion.profile",
     "contour": "pbrdf.inversion.contour",
@@ -220,6 +222,7 @@ __all__ = [
     "map_dataset",
     "merit",
     "open_experiment",
+    "open_map",
     "parse_pixel_geometry",
     "plan",
     "plausibility",

@@ -170,18 +170,18 @@ def test_interrupted_it_goes_on_where_it_was(at_trial, tmp_path, whole, monkeypa
     common = ("map", "trial/reduced/stokes.zarr", "-g", "flat", "-o", "paint.zarr", *FIT, "--unit", 8)
     do, done = MapStore.do, []
 
-    def stopped(self, number):
+    def stopped(self, number, progress):
         if len(done) == 3:
             raise KeyboardInterrupt
         done.append(number)
-        do(self, number)
+        do(self, number, progress)
 
     monkeypatch.setattr(MapStore, "do", stopped)
     result = at_trial(*common, code=130)
     assert result.stderr.splitlines()[-1] == (
         "pbrdf: error: interrupted; 3 of 8 units are kept in paint.zarr: the same command goes on from there"
     )
-    monkeypatch.setattr(MapStore, "do", lambda self, number: (done.append(number), do(self, number)))
+    monkeypatch.setattr(MapStore, "do", lambda self, number, progress: (done.append(number), do(self, number, progress)))
     at_trial(*common, "-q")
     assert sorted(done) == list(range(8))
     same(opened(tmp_path / "paint.zarr"), opened(whole))

@@ -8,6 +8,7 @@ from pbrdf.errors import DataError
 from pbrdf.files.atomic import (
     atomic_file,
     atomic_folder,
+    atomic_new_folder,
     require_new_folder,
     require_writable_folder,
 )
@@ -101,6 +102,24 @@ def test_a_file_is_not_replaced_by_a_folder(tmp_path, fill):
         pass
     assert (tmp_path / "file").read_text() == "mine"
     assert len(list(tmp_path.iterdir())) == 1
+
+
+def test_of_two_that_make_the_same_folder_the_first_is_kept(tmp_path):
+    with atomic_new_folder(tmp_path / "maps.zarr") as ours:
+        (ours / "whose").write_text("ours")
+        with atomic_new_folder(tmp_path / "maps.zarr") as theirs:
+            (theirs / "whose").write_text("theirs")
+        assert (tmp_path / "maps.zarr" / "whose").read_text() == "theirs"
+    assert (tmp_path / "maps.zarr" / "whose").read_text() == "theirs"
+    assert [path.name for path in tmp_path.iterdir()] == ["maps.zarr"]
+    with (
+        pytest.raises(DataError, match=r"nowhere/maps\.zarr: cannot be written: No such file"),
+        atomic_new_folder(tmp_path / "nowhere" / "maps.zarr"),
+    ):
+        pass
+    with pytest.raises(RuntimeError), atomic_new_folder(tmp_path / "other.zarr"):
+        raise RuntimeError
+    assert [path.name for path in tmp_path.iterdir()] == ["maps.zarr"]
 
 
 def test_a_new_folder_is_one_that_is_not_there_or_empty(tmp_path):

@@ -94,7 +94,7 @@ def test_a_shard_that_is_missing_cut_off_or_lacks_a_chunk_is_named(sharded, code
     shard = path / "I" / "c" / "1" / "0"
     content = shard.read_bytes()
     index = len(content) - 16 * 4 - 4
-    for keep in range(len(content)):
+    for keep in (*range(0, len(content), 7), index, len(content) - 1):
         shard.write_bytes(content[:keep])
         with pytest.raises(DataError, match=r"s\.zarr: the chunk I/c/1/0 .*(cut off|lacks|damaged)"):
             require_complete(path)

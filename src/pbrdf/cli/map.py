@@ -376,10 +376,13 @@ def _fill(
             if look is not None:
                 look()
 
+        def within(done: int, pixels: int) -> None:
+            show(f"{_FITTING}, unit {state[0] + 1} of {state[1]}, pixels", done, pixels)
+
         if scheduler is not None:
             work = run_on_scheduler(store, scheduler, progress=progress)
         else:
-            work = run_units(store, worker=place, progress=progress)
+            work = run_units(store, worker=place, progress=progress, within=within)
     say_when_interrupted()
     if work.left and not quiet:
         warn(

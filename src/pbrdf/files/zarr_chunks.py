@@ -24,7 +24,7 @@ from pbrdf.files.hdf5_guard import available_memory
 from pbrdf.files.hdf5_probe import ALWAYS_ALLOWED, amount
 from pbrdf.files.plain_numbers import json_from_text
 
-__all__ = ["StoredArray", "require_complete"]
+__all__ = ["StoredArray", "array_names", "require_complete"]
 
 #: The strongest compressors pack some ten thousand equal bytes into one.
 _MOST_TIMES_ITS_SIZE = 100_000
@@ -200,7 +200,7 @@ def require_complete(path: Path, *, loaded: bool = True) -> None:
         If an array or a chunk is missing or cut off, or an array declares what the folder cannot hold; names it.
     """
     try:
-        names = _arrays(path)
+        names = array_names(path)
         total = 0
         for name in names:
             total += _check_array(StoredArray.of(path, name))
@@ -214,8 +214,8 @@ def require_complete(path: Path, *, loaded: bool = True) -> None:
         )
 
 
-def _arrays(path: Path) -> list[str]:
-    """Names of the arrays of a group, those that its list of contents names among them."""
+def array_names(path: Path) -> list[str]:
+    """Names of the arrays of a group; raises DataError if one is missing that its list of contents names."""
     names = [
         entry.name
         for entry in sorted(path.iterdir())

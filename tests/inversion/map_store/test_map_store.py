@@ -6,6 +6,7 @@ import errno
 import json
 import pickle
 import shutil
+import subprocess
 import sys
 
 import numpy as np
@@ -143,6 +144,25 @@ def test_a_file_that_is_lost_or_cut_off_is_named_and_made_again(store, name, kee
     assert run_units(again).done == 1
     assert contents(store.path) == whole
     open_map(store.path).load()
+    shutil.rmtree(store.path / name)
+    with pytest.raises(DataError, match=f"the array '{name}' is missing, though zarr.json lists it"):
+        open_map(store.path)
+
+
+def test_a_store_that_lost_its_metadata_is_one_line(store):
+    for name, words in (("estimate", "estimate"), ("status", "status")):
+        file = store.path / name / "zarr.json"
+        content = file.read_bytes()
+        for kept in (None, b"{", b"{}"):
+            file.unlink() if kept is None else file.write_bytes(kept)
+            if name == "status" or kept:
+                with pytest.raises(DataError, match=rf"maps\.zarr.*({words}|damaged)"):
+                    open_map(store.path, partial=True)
+            with pytest.raises(
+                DataError, match=r"maps\.zarr.*(damaged|is missing, though zarr.json lists it)"
+            ):
+                run_units(store_at(store.path))
+            file.write_bytes(content)
 
 
 @pytest.mark.parametrize("full_at", [3, 9, 16])
@@ -169,12 +189,50 @@ def test_a_full_disk_is_one_line_and_the_map_goes_on_when_there_is_room(tmp_path
     assert sorted(file.name for file in tmp_path.iterdir()) == ["alone.zarr", "maps.zarr"]
 
 
+@pytest.fixture
+def small_disk(tmp_path):
+    """A disk of 400 kB, and what makes it larger."""
+
+    def mounted(*options):
+        return (
+            subprocess.run(["mount", *options, str(tmp_path)], capture_output=True, check=False).returncode
+            == 0
+        )
+
+    if (
+        sys.platform != "linux"
+        or not shutil.which("mount")
+        or not mounted("-t", "tmpfs", "-o", "size=400k", "tmpfs")
+    ):
+        pytest.skip("no disk can be mounted")
+    yield tmp_path, lambda: mounted("-o", "remount,size=4m")
+    subprocess.run(["umount", str(tmp_path)], check=True)
+
+
+@pytest.mark.slow
+def test_a_disk_that_is_really_full(small_disk, tmp_path_factory):
+    disk, grow = small_disk
+    dataset = picture(96, 96, 3)
+    left = []
+    for _ in range(2):
+        with pytest.raises(
+            DataError, match=r"unit \d+ cannot be written: No space left on device; what is done is"
+        ):
+            run_units(store_at(disk / "maps.zarr", dataset))
+        left.append(len(store_at(disk / "maps.zarr", dataset).missing()))
+    assert 0 < left[0] < 36 and left[1] == left[0]
+    assert not list(disk.rglob("*.partial"))
+    assert grow()
+    assert run_units(store_at(disk / "maps.zarr", dataset)).done == left[0]
+    alone = tmp_path_factory.mktemp("alone") / "maps.zarr"
+    run_units(store_at(alone, dataset))
+    assert contents(disk / "maps.zarr") == contents(alone)
+
+
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="limits of Linux")
 def test_files_that_may_not_grow_are_one_line(tmp_path):
     """What the system says when a file reaches the limit of its size, in a process of its own."""
-    import subprocess
-
     code = (
         "import resource, signal, sys; sys.path[:0] = sys.argv[2:]\n"
         "from stand_in_fit import *\n"

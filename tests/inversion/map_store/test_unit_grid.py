@@ -38,6 +38,8 @@ def test_lengths_that_are_given_are_kept():
     assert (grid.shard, grid.chunk) == ((16, 32), (16, 8))
     assert grid.grid == (5, 2) and grid.count == 10
     assert grid.slices(9) == {"y": slice(64, 70), "x": slice(32, 50)}
+    for shard, chunk in ((12, 12), (200, 50), (251, 251), (96, 48), (320, 64), (6, 6)):
+        assert UnitGrid.of({"y": 700, "x": 500}, {"y": shard, "x": 4096 // 64}).chunk[0] == chunk
 
 
 def test_workers_share_all_units_and_none_twice():

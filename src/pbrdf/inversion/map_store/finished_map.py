@@ -14,7 +14,7 @@ from pbrdf.errors import DataError
 from pbrdf.files.atomic import atomic_file
 from pbrdf.files.plain_numbers import json_from_text
 from pbrdf.files.zarr_chunks import StoredArray
-from pbrdf.inversion.map_store.map_store import COMPLETE, MARK, MapStore, stored_attributes
+from pbrdf.inversion.map_store.map_store import COMPLETE, MARK, MapStore, damaged, stored_attributes
 
 __all__ = ["finish", "open_map"]
 
@@ -90,14 +90,20 @@ def open_map(path: str | Path, *, partial: bool = False) -> xr.Dataset:
     path = Path(path)
     attributes = stored_attributes(path)
     if not attributes.get(COMPLETE):
-        mark = StoredArray.of(path, MARK)
-        left = sum(not mark.file(index).exists() for index in mark.indices())
+        try:
+            mark = StoredArray.of(path, MARK)
+            left = sum(not mark.file(index).exists() for index in mark.indices())
+        except OSError as error:
+            raise damaged(path, error) from error
         if not partial:
             what = f"{left} of {mark.count} units are missing" if left else "the last step is missing"
             raise DataError(
                 f"{path}: this map is not complete: {what}; the command that began it goes on with it"
             )
-        found = xr.open_dataset(path, engine="zarr", zarr_format=3, consolidated=False, cache=False)
+        try:
+            found = xr.open_dataset(path, engine="zarr", zarr_format=3, consolidated=False, cache=False)
+        except Exception as error:  # the library raises anything over damaged metadata
+            raise damaged(path, error) from error
         return found.assign_attrs(units_missing=left)
     try:
         return open_zarr(path, cache=False)

@@ -26,12 +26,21 @@ from pbrdf.data.formats.zarr_folder import create_zarr, is_zarr, list_arrays, re
 from pbrdf.errors import DataError
 from pbrdf.files.atomic import atomic_new_folder
 from pbrdf.files.plain_numbers import json_from_text
-from pbrdf.files.zarr_chunks import StoredArray
+from pbrdf.files.zarr_chunks import StoredArray, array_names
 from pbrdf.inversion.map_store.map_source import MapSource
 from pbrdf.inversion.map_store.settings import differences, digest_of, settings_text
 from pbrdf.inversion.map_store.unit_grid import UnitGrid
 
-__all__ = ["COMPLETE", "MARK", "NOT_DONE", "MapStore", "PixelFit", "prepare_store", "stored_attributes"]
+__all__ = [
+    "COMPLETE",
+    "MARK",
+    "NOT_DONE",
+    "MapStore",
+    "PixelFit",
+    "damaged",
+    "prepare_store",
+    "stored_attributes",
+]
 
 #: Version of the layout of stores; another one is refused.
 _LAYOUT = 1
@@ -137,14 +146,20 @@ class MapStore:
         """The arrays that units fill, the mark last."""
         import zarr
 
-        group: Any = zarr.open_group(self.path, mode="r+", zarr_format=3, use_consolidated=False)
-        # a chunk that is left out because it is all fill value could not be told from one that was lost
-        found = {
-            name: array.with_config({"write_empty_chunks": True})
-            for name, array in group.arrays()
-            if array.shards is not None and {*self.fit.dims} <= {*array.metadata.dimension_names}
-        }
-        return {**{name: found[name] for name in sorted({*found} - {MARK})}, MARK: found[MARK]}
+        try:
+            group: Any = zarr.open_group(self.path, mode="r+", zarr_format=3, use_consolidated=False)
+            arrays = {name: group[name] for name in array_names(self.path)}
+            # a chunk that is left out because it is all fill value could not be told from one that was lost
+            found = {
+                name: array.with_config({"write_empty_chunks": True})
+                for name, array in arrays.items()
+                if array.shards is not None and {*self.fit.dims} <= {*array.metadata.dimension_names}
+            }
+            return {**{name: found[name] for name in sorted({*found} - {MARK})}, MARK: found[MARK]}
+        except DataError:
+            raise
+        except Exception as error:  # the library raises anything over damaged metadata
+            raise damaged(self.path, error) from error
 
     @cached_property
     def _files(self) -> dict[str, StoredArray]:
@@ -185,8 +200,15 @@ class MapStore:
         """Numbers of the units that are not done, of those that are a worker's share."""
         return [number for number in self.grid.share(worker) if not self.is_done(number)]
 
-    def do(self, number: int) -> None:
+    def do(self, number: int, progress: Callable[[int, int], None] | None = None) -> None:
         """Fit the pixels of a unit and write what was found.
+
+        Parameters
+        ----------
+        number
+            Of the unit.
+        progress
+            Called with the number of its pixels that are fitted and of all.
 
         Raises
         ------
@@ -194,7 +216,7 @@ class MapStore:
             If the store is another one by now, or cannot be written.
         """
         slices = self.grid.slices(number)
-        self.write(number, self.fit.fit_block(self.source.block(slices)))
+        self.write(number, self.fit.fit_block(self.source.block(slices), progress))
 
     def write(self, number: int, result: xr.Dataset) -> None:
         """Write the result of a unit, its mark last."""
@@ -267,6 +289,11 @@ def stored_attributes(path: Path) -> dict[str, Any]:
             f"{path}: this map has the layout {version}, of another version of pbrdf; {_LAYOUT} is known"
         )
     return attributes
+
+
+def damaged(path: Path, error: Exception) -> DataError:
+    """What to say of a store whose arrays cannot be opened."""
+    return DataError(f"{path}: this map is damaged: {' '.join(str(error).split()) or type(error).__name__}")
 
 
 def _write_template(folder: Path, template: xr.Dataset, grid: UnitGrid, settings: dict[str, Any]) -> None:

@@ -64,7 +64,12 @@ class UnitGrid:
                 if length < 1:
                     raise PbrdfError(f"units: {length} pixels along {dim}")
         units = _lengths(sizes, _UNIT, shard or {})
-        chunks = _lengths(dict(zip(sizes, units, strict=True)), _CHUNK, chunk or {})
+        chunks = tuple(
+            length if dim in (chunk or {}) else _divisor(unit, length)
+            for dim, unit, length in zip(
+                sizes, units, _lengths(dict(zip(sizes, units, strict=True)), _CHUNK, chunk or {}), strict=True
+            )
+        )
         for dim, outer, inner in zip(sizes, units, chunks, strict=True):
             if outer % inner:
                 raise PbrdfError(f"units: {outer} pixels along {dim} are not whole chunks of {inner}")
@@ -109,6 +114,12 @@ class UnitGrid:
         if not 1 <= number <= workers:
             raise PbrdfError(f"worker {number}/{workers}: workers are counted from 1 to {workers}")
         return range(number - 1, self.count, workers)
+
+
+def _divisor(length: int, wanted: int) -> int:
+    """The divisor of a length that is the nearest to another one, as ratios go."""
+    divisors = (d for d in range(1, length + 1) if length % d == 0)
+    return min(divisors, key=lambda d: max(d / wanted, wanted / d))
 
 
 def _lengths(sizes: Mapping[str, int], pixels: int, given: Mapping[str, int]) -> tuple[int, ...]:
