@@ -71,26 +71,26 @@ def goodness(
 
 
 def covariance(information: np.ndarray, spread: np.ndarray) -> np.ndarray:
-    """Invert an information matrix JᵀJ, letting directions without information have a very large variance.
+    """Invert information matrices JᵀJ, letting directions without information have a very large variance.
 
     Parameters
     ----------
     information
-        Shape (P, P).
+        Shape (…, P, P).
     spread
-        Natural scale of each unknown, shape (P,); the matrix is scaled with it before its eigenvalues are
+        Natural scale of each unknown, shape (…, P); the matrix is scaled with it before its eigenvalues are
         judged against rounding.
 
     Returns
     -------
     ndarray
-        Shape (P, P).
+        Shape (…, P, P).
     """
-    scaled = information * np.outer(spread, spread)
-    eigenvalues, vectors = np.linalg.eigh(scaled)
-    floor = max(float(eigenvalues.max(initial=0.0)), 0.0) * 1e-15 + 1e-200
-    inverse = (vectors / np.maximum(eigenvalues, floor)) @ vectors.T
-    return inverse * np.outer(spread, spread)
+    scale = spread[..., :, None] * spread[..., None, :]
+    eigenvalues, vectors = np.linalg.eigh(information * scale)
+    floor = eigenvalues.max(axis=-1, keepdims=True, initial=0.0) * 1e-15 + 1e-200
+    inverse = (vectors / np.maximum(eigenvalues, floor)[..., None, :]) @ vectors.swapaxes(-1, -2)
+    return inverse * scale
 
 
 def prior_spread(lower: np.ndarray, upper: np.ndarray) -> np.ndarray:

@@ -21,8 +21,8 @@ __all__ = ["Ends", "Pixels", "grouped"]
 #: Ends of a search that are the same optimum: in every unknown to this part of its range, in the cost to this part;
 #: and ends of fits.
 SEARCHED, ENDED = (1e-3, 1e-3), (1e-4, 1e-6)
-#: Distinct ends of a search that are looked at in the model's own accuracy: those of no more than so many times the best
-#: χ², and so many at most.
+#: Distinct ends of a search that are looked at in the model's own accuracy: of no more than so many times the best χ²,
+#: and so many at most.
 RIVALS, LEADERS = 10.0, 8
 #: Lanes that are searched together, at most.
 LANES = 1 << 16

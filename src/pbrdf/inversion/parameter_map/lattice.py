@@ -53,16 +53,14 @@ def levels(shape: Sequence[int], places: np.ndarray) -> list[Level]:
     step = 1
     while np.prod([-(-n // step) for n in shape]) > most:
         step += 1 if step < 2 * FINER else step // FINER
-    first = np.unique(_representatives(shape, places, step))
-    first = first[first >= 0]
+    first = _chosen(shape, places, step)
     result = [Level(first, np.empty((len(first), 0), dtype=int), np.empty((len(first), 0)))]
     fitted = np.zeros(len(places), dtype=bool)
     fitted[first] = True
     while step > 1:
         grid = _representatives(shape, places, step).reshape([-(-n // step) for n in shape])
         finer = step // FINER if step > 2 * FINER else 1
-        pixels = np.unique(_representatives(shape, places, finer))
-        pixels = pixels[pixels >= 0]
+        pixels = _chosen(shape, places, finer)
         pixels = pixels[~fitted[pixels]]
         result.append(Level(pixels, *_around(grid, places[pixels], step)))
         fitted[pixels] = True
@@ -82,6 +80,14 @@ def neighbours(shape: Sequence[int], places: np.ndarray) -> np.ndarray:
     number[tuple(inner.T)] = np.arange(len(places))
     steps = [sign * row for row in np.eye(len(shape), dtype=int) for sign in (-1, 1)]
     return np.stack([number[tuple((inner + step).T)] for step in steps], axis=1)
+
+
+def _chosen(shape: Sequence[int], places: np.ndarray, step: int) -> np.ndarray:
+    """Numbers of the representatives of all cells, ascending."""
+    if step == 1:
+        return np.arange(len(places))
+    found = np.sort(_representatives(shape, places, step))
+    return found[found >= 0]
 
 
 def _representatives(shape: Sequence[int], places: np.ndarray, step: int) -> np.ndarray:

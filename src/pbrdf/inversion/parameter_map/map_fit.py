@@ -49,8 +49,8 @@ MASK, LABEL = "mask", "label"
 #: Changes whenever the same settings would give other numbers or another form.
 LAYOUT = 1
 #: Pixels of a label from which the shared parameters' starting values are found, and values between their bounds that
-#: are tried, too.
-FEW, BEGINNINGS = 24, 8
+#: are tried where single pixels tell nothing.
+FEW, BEGINNINGS = 24, 16
 _ANGLES = ("theta_i", "theta_r", "phi")
 _MEASURED = {*VARIABLES, *map(std_name, VARIABLES), COVARIANCE}
 
@@ -308,15 +308,19 @@ max_iterations, share, correlation
                 )
             return with_priors(total, priors, theta)
 
-        # where to begin: the best of the middle of what single pixels say and of some values between the bounds
-        middle = self._middle(few, labels, columns, low, high)
-        spread = sobol_starts(
-            np.zeros(len(columns)), np.ones(len(columns)), BEGINNINGS, self.settings["seed"]
-        )
-        candidates = [middle, *(low + one * (high - low) for one in spread)]
-        tried = [evaluate(candidate, few).cost for candidate in candidates]
-        best = np.argmin(np.where(np.isfinite(tried), tried, np.inf), axis=0)
-        begin = np.stack(candidates)[best, np.arange(len(labels))]
+        middle, said = self._middle(few, labels, columns, low, high)
+        candidates = [middle]
+        if not said:
+            # pixels that alone tell nothing: the best of some values between the bounds
+            spread = sobol_starts(
+                np.zeros(len(columns)), np.ones(len(columns)), BEGINNINGS, self.settings["seed"]
+            )
+            candidates += [low + one * (high - low) for one in spread]
+        begin = middle
+        if len(candidates) > 1:
+            tried = [evaluate(candidate, few).cost for candidate in candidates]
+            best = np.argmin(np.where(np.isfinite(tried), tried, np.inf), axis=0)
+            begin = np.stack(candidates)[best, np.arange(len(labels))]
         theta, sums, converged, passes = newton(
             lambda at: evaluate(at, (p for p in map(self._part, blocks) if p is not None)), begin, low, high
         )
@@ -382,8 +386,8 @@ max_iterations, share, correlation
 
     def _middle(
         self, few: list[_Part], labels: np.ndarray, columns: np.ndarray, low: np.ndarray, high: np.ndarray
-    ) -> np.ndarray:
-        """Median of what single pixels say of the shared unknowns, shape (L, S)."""
+    ) -> tuple[np.ndarray, bool]:
+        """Median of what single pixels say of the shared unknowns, shape (L, S), and whether they do for each label."""
         said: dict[int, list[np.ndarray]] = {label: [] for label in labels.tolist()}
         for part in few:
             enough = np.flatnonzero(part.freedom + self._own > len(self.space.free))
@@ -395,7 +399,7 @@ max_iterations, share, correlation
         for row, label in enumerate(labels.tolist()):
             if said[label]:
                 middle[row] = np.nanmedian(said[label], axis=0)
-        return np.clip(middle, low, high)
+        return np.clip(middle, low, high), all(said.values())
 
     @property
     def _own(self) -> int:

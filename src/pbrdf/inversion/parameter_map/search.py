@@ -15,6 +15,7 @@ All depends on the block alone, and on no chance but the seed.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -28,7 +29,7 @@ __all__ = ["fit_pixels", "standing_out"]
 #: A start suits if its χ² is no more than so many times what is expected, plus the last term for each unknown.
 SUITS, FOR_EACH_UNKNOWN = 1.5, 4.0
 #: A pixel whose χ² is so many deviations above its like is offered what its neighbours found; is tried again from many
-#: starts.
+#: starts, or at as many as the largest of so many normal variables has: √(2 ln B).
 OFFERED, TRIED_AGAIN = 2.0, 3.5
 #: Pixels tried again at first: so many, or one in so many; each time that it helps one in HELPS, MORE times as many.
 AT_FIRST, ONE_IN, HELPS, MORE = 16, 4096, 20, 4
@@ -138,10 +139,11 @@ def _undo_wrong_ones(
     _spread(pixels, ends, beside, _offer(pixels, ends, beside, np.flatnonzero(deviations() > OFFERED)))
     tried = np.zeros(len(places), dtype=bool)
     most = max(AT_FIRST, len(places) // ONE_IN)
+    limit = max(TRIED_AGAIN, math.sqrt(2.0 * math.log(len(places))))
     while True:
         z = np.where(tried, -np.inf, deviations())
         again = np.argsort(-z, kind="stable")[:most]
-        again = np.sort(again[z[again] > TRIED_AGAIN])
+        again = np.sort(again[z[again] > limit])
         if not len(again):
             return
         tried[again] = True
@@ -217,10 +219,10 @@ def standing_out(
     size = np.log(np.maximum(reduced, 1e-300))
     finite = np.isfinite(size)
     expected = np.sqrt(2.0 / freedom)
-    cell = np.unique(cells(shape, places, NEIGHBOURHOOD), return_inverse=True)[1].ravel()
+    usual = np.median(size[finite]) if finite.any() else 0.0
+    around = _medians(np.where(finite, size, np.inf), cells(shape, places, NEIGHBOURHOOD))
     result = np.full(len(cost), -np.inf)
-    for group in (cell, np.zeros(len(cost), dtype=int)):
-        above = size - _medians(np.where(finite, size, np.inf), group)[group]
+    for above in (size - around, size - usual):
         scatter = 1.4826 * np.median(np.abs(above[finite])) if finite.any() else 0.0
         result = np.maximum(result, above / np.maximum(expected, scatter))
     result = np.maximum(result, np.where(std_known, (reduced - 1.0) / expected, -np.inf))
@@ -232,8 +234,10 @@ def _reduced(cost: np.ndarray, freedom: np.ndarray) -> np.ndarray:
 
 
 def _medians(values: np.ndarray, group: np.ndarray) -> np.ndarray:
-    """Median of the values of each group, the lower one of two."""
+    """Median of the values of the group of each, the lower one of two."""
     order = np.lexsort((values, group))
     begin = np.flatnonzero(np.diff(group[order], prepend=-1))
     size = np.diff(np.append(begin, len(order)))
-    return values[order[begin + (size - 1) // 2]]
+    result = np.empty(len(values))
+    result[order] = np.repeat(values[order[begin + (size - 1) // 2]], size)
+    return result

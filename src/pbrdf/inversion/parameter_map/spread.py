@@ -93,20 +93,30 @@ def _inverse(information: np.ndarray, inside: np.ndarray, prior: np.ndarray) -> 
     matrices *= unit[:, :, None] * unit[:, None, :]
     # to each a unit diagonal; rows of unknowns on a bound become those of the unit matrix
     matrices[:, range(size), range(size)] = 1.0
-    usable &= _positive(matrices)
-    matrices[~usable] = np.eye(size)
-    inverse = np.linalg.inv(matrices)
-    usable &= np.abs(inverse).max(axis=(1, 2), initial=0.0) < WELL_CONDITIONED
+    inverse = _inverted(matrices)
+    with np.errstate(invalid="ignore"):
+        usable &= np.abs(inverse).max(axis=(1, 2), initial=0.0) < WELL_CONDITIONED
+        # the inverse of what is not positive definite has no variances
+        usable &= (np.einsum("bpp->bp", inverse) > 0.0).all(axis=1)
     inverse *= unit[:, :, None] * unit[:, None, :]
-    for b in np.flatnonzero(~usable):
-        inverse[b] = 0.0
-        kept = np.flatnonzero(inside[b])
-        if len(kept) and np.isfinite(information[b]).all():
-            inverse[np.ix_([b], kept, kept)] = covariance(information[b][np.ix_(kept, kept)], prior[b, kept])
+    inverse[~usable] = 0.0
+    # the others by their eigenvalues, those with the same unknowns on a bound together
+    left = np.flatnonzero(~usable & np.isfinite(information).all(axis=(1, 2)))
+    for kept in np.unique(inside[left], axis=0):
+        here = left[(inside[left] == kept).all(axis=1)]
+        free = np.flatnonzero(kept)
+        at = np.ix_(here, free, free)
+        inverse[at] = covariance(information[at], prior[np.ix_(here, free)])
     return inverse
 
 
-def _positive(matrices: np.ndarray) -> np.ndarray:
-    """Which matrices of unit diagonal are far enough from singular to be inverted."""
-    sign, size = np.linalg.slogdet(matrices)
-    return (sign > 0.0) & (size > -80.0)
+def _inverted(matrices: np.ndarray) -> np.ndarray:
+    """Inverses; NaN of what is singular."""
+    try:
+        return np.linalg.inv(matrices)
+    except np.linalg.LinAlgError:
+        # one that is exactly singular stops all
+        regular = np.linalg.slogdet(matrices)[0] != 0.0
+        result = np.full_like(matrices, np.nan)
+        result[regular] = np.linalg.inv(matrices[regular])
+        return result
