@@ -56,3 +56,13 @@ def shaded(geometry, rows, columns, *, background=0.02, noise=0.003, seed=0, fin
     values += np.random.default_rng(seed).normal(0.0, noise, values.shape)
     pictures = blank(rows, columns, len(values))
     return pictures.assign(I=(("series", "y", "x"), values))
+
+
+def seen(model, geometry, rows, columns, *, noise=0.02, seed=0, fine=3):
+    """Pictures of a painted sample before a black background, each pixel the mean of finer ones; noise in parts of the
+    sample's median."""
+    place = [(np.arange(n * fine) + 0.5) / fine - 0.5 for n in (columns, rows)]
+    values = painted(model, geometry.pixels(*place)).I.values
+    values = values.reshape(-1, rows, fine, columns, fine).mean(axis=(2, 4))
+    values += np.random.default_rng(seed).normal(0.0, noise * np.median(values[values > 0.0]), values.shape)
+    return blank(rows, columns, len(values)).assign(I=(("series", "y", "x"), values))

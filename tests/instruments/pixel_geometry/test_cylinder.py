@@ -5,11 +5,12 @@ import math
 import numpy as np
 import pytest
 
+import pbrdf
 from pbrdf.errors import DataError
 from pbrdf.instruments.goniometer.rays import angles_of
 from pbrdf.instruments.pixel_geometry.camera import Lamp, PixelCamera
 from pbrdf.instruments.pixel_geometry.cylinder import Cylinder
-from pixel_helpers import blank, shaded
+from pixel_helpers import blank, seen, shaded
 
 LAMPS = [Lamp(1.0, 0.0), Lamp(1.0, math.pi)]
 PERSPECTIVE = PixelCamera(field_of_view=math.radians(30.0))
@@ -100,6 +101,26 @@ def test_it_is_found(camera, tilt):
     assert found.tilt == pytest.approx(0.0 if camera.field_of_view is None else tilt, abs=6e-3)
     assert found.length == pytest.approx(70.0, abs=2.0)
     assert found.pixels(np.arange(3), np.arange(3)).attrs["found"] == 1
+
+
+@pytest.mark.parametrize("amplitude", [0.3, 0.02])
+def test_a_glossy_cylinder_is_not_its_highlight(amplitude):
+    """White or nearly black, with a bright stripe along it: to a fifth of a pixel."""
+    paint = pbrdf.DoubleGauss(sigma=0.03, n=1.6, a=amplitude, k=1.2, b=0.2, t=0.6)
+    true = Cylinder(
+        x=60.3,
+        y=46.8,
+        r=18.4,
+        angle=1.5,
+        length=70.0,
+        lamps=LAMPS,
+        camera=PixelCamera().sized(100, 120),
+        max_zenith=1.57,
+    )
+    found = Cylinder(lamps=LAMPS).located(seen(paint, true, 100, 120))
+    assert found.x + (found.y - 46.8) / math.tan(1.5) == pytest.approx(60.3, abs=0.2)
+    assert found.r == pytest.approx(18.4, abs=0.2)
+    assert found.angle == pytest.approx(1.5, abs=3e-3)
 
 
 def test_it_may_leave_the_picture():

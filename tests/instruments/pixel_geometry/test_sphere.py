@@ -5,11 +5,12 @@ import math
 import numpy as np
 import pytest
 
+import pbrdf
 from pbrdf.errors import DataError
 from pbrdf.instruments.goniometer.rays import angles_of
 from pbrdf.instruments.pixel_geometry.camera import Lamp, PixelCamera
 from pbrdf.instruments.pixel_geometry.sphere import Sphere
-from pixel_helpers import blank, shaded
+from pixel_helpers import blank, seen, shaded
 
 SIDE = Lamp(math.radians(50.0), math.radians(30.0))
 TWO = [Lamp(0.8, 1.0), Lamp(0.8, 4.2)]
@@ -93,6 +94,15 @@ def test_a_dark_ball_before_a_bright_wall_and_bad_pixels():
     pictures = pictures.assign(I=(pictures.I.dims, values), flags=(pictures.I.dims, flags))
     found = Sphere(lamps=lamps).located(pictures)
     assert (found.x, found.y, found.r) == pytest.approx((100.2, 70.6, 45.0), abs=0.3)
+
+
+@pytest.mark.parametrize("amplitude", [0.3, 0.02])
+def test_a_glossy_ball_is_not_its_highlight(amplitude):
+    """White or nearly black, with highlights a hundred times brighter: to a fifth of a pixel."""
+    paint = pbrdf.DoubleGauss(sigma=0.03, n=1.6, a=amplitude, k=1.2, b=0.2, t=0.6)
+    true = Sphere(x=60.3, y=46.8, r=35.4, lamps=TWO, camera=PixelCamera().sized(100, 120), max_zenith=1.57)
+    found = Sphere(lamps=TWO).located(seen(paint, true, 100, 120))
+    assert (found.x, found.y, found.r) == pytest.approx((60.3, 46.8, 35.4), abs=0.2)
 
 
 def test_nothing_round_is_said():

@@ -25,12 +25,17 @@ __all__ = ["Bar", "Circle", "find_bar", "find_circle", "sample_picture"]
 
 #: Larger pictures are thinned to about so many pixels to look for the sample.
 _MOST_PIXELS = 2**21
-#: Step above the background that counts, in parts of the picture's range, and in noise of the background.
-_STEP, _NOISE = 0.03, 6.0
+#: Steps above the background that are tried, in parts of the picture's range, the lower ones for dark samples with
+#: bright highlights; and the least, in noise of the background.
+_STEPS, _NOISE = (0.03, 0.003, 0.0003), 6.0
+#: The same for the sharpness of an edge, in parts of the sample's median.
+_RISE, _RISE_NOISE = 0.06, 3.0
 #: Connected parts of the picture that are looked at, by size.
 _PARTS = 3
 #: Random samples of outline points; they are the same ones in every run.
 _TRIALS = 400
+#: Smaller balls and cylinders are highlights, or specks, pixels of the thinned picture.
+_LEAST_RADIUS = 4.0
 #: What an outline must have in common with the circle: share of the whole circle, of the outline, of the area.
 _ARC, _SHARE, _INSIDE = 0.25, 0.35, 0.9
 #: Half the length of the profile across an outline, in pixels.
@@ -41,6 +46,10 @@ _SECTORS = 72
 _NOT_ROUND = (
     "no round outline was found in the picture: give the ball's place and radius in pixels, x, y and r (a ball that is "
     "lit from behind, cut off by the picture or before a background as bright is not found)"
+)
+_NOT_STRAIGHT = (
+    "no two straight edges were found in the picture: give the cylinder's place, half width and direction, x, y, r "
+    "(pixels) and angle"
 )
 _SOFT_EDGE = (
     "one of the cylinder's edges is not sharp, as where its shadow begins: give x, y, r and angle, or add a picture "
@@ -157,7 +166,7 @@ def find_circle(stokes: xr.Dataset, camera: PixelCamera) -> Circle:
         If no part of the picture has a round outline.
     """
     picture = _Picture(*sample_picture(stokes))
-    best: tuple[float, np.ndarray, np.ndarray, np.ndarray] | None = None
+    found: list[tuple[float, np.ndarray, np.ndarray, np.ndarray]] = []
     for part, values in _parts(picture.values):
         points = _outline(part)
         circle = _sampled_circle(points, part)
@@ -171,18 +180,19 @@ def find_circle(stokes: xr.Dataset, camera: PixelCamera) -> Circle:
         inside = (np.hypot(columns - circle[0], rows - circle[1]) < circle[2] + 1.5).mean()
         if arc < _ARC or share < _SHARE or inside < _INSIDE:
             continue
-        score = arc * share * inside * math.sqrt(circle[2])
-        if best is None or score > best[0]:
-            best = (score, circle, part, values)
-    if best is None:
-        raise DataError(_NOT_ROUND)
-    return _precise_circle(*best[1:], picture, camera)
+        found.append((arc * share * inside * math.sqrt(circle[2]), circle, part, values))
+    # the best of those whose edge is sharp
+    for _, circle, part, values in sorted(found, key=lambda one: -one[0]):
+        precise = _precise_circle(circle, part, values, picture, camera)
+        if precise is not None:
+            return precise
+    raise DataError(_NOT_ROUND)
 
 
 def find_bar(stokes: xr.Dataset) -> Bar:
     """The two straight edges of a cylinder; parameters and errors as :func:`find_circle` has."""
     picture = _Picture(*sample_picture(stokes))
-    best: tuple[float, list[np.ndarray], np.ndarray, np.ndarray, np.ndarray] | None = None
+    found: list[tuple[float, list[np.ndarray], np.ndarray, np.ndarray, np.ndarray]] = []
     for part, values in _parts(picture.values):
         points = _outline(part)
         lines = _sampled_lines(points)
@@ -196,15 +206,18 @@ def find_bar(stokes: xr.Dataset) -> Bar:
         between = ((off[0] > -2.0) & (off[1] > -2.0)).mean()
         if share < 0.5 or between < _INSIDE:
             continue
-        score = share * between * math.sqrt(min(c.sum() for c in close))
-        if best is None or score > best[0]:
-            best = (score, lines, points, part, values)
-    if best is None:
-        raise DataError(
-            "no two straight edges were found in the picture: give the cylinder's place, half width and direction, "
-            "x, y, r (pixels) and angle"
-        )
-    return _precise_bar(*best[1:], picture)
+        length = min(c.sum() for c in close)
+        width = abs(points[close[1]].mean(axis=0) @ lines[0][:2] - lines[0][2])
+        if width < 2.0 * _LEAST_RADIUS:
+            continue
+        found.append((share * between * math.sqrt(length * width), lines, points, part, values))
+    if not found:
+        raise DataError(_NOT_STRAIGHT)
+    for _, lines, points, part, values in sorted(found, key=lambda one: -one[0]):
+        precise = _precise_bar(lines, points, part, values, picture)
+        if precise is not None:
+            return precise
+    raise DataError(_SOFT_EDGE)
 
 
 def _parts(values: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
@@ -221,8 +234,8 @@ def _parts(values: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         span = ends[1] - sign * background
         if not span > 0.0:
             continue
-        least = sign * background + max(_STEP * span, _NOISE * noise)
-        for level in (least, _otsu(np.clip(signed, *ends))):
+        levels = {sign * background + max(step * span, _NOISE * noise) for step in _STEPS}
+        for level in (*sorted(levels), _otsu(np.clip(signed, *ends))):
             marks, count = ndimage.label(signed > level)
             if not count:
                 continue
@@ -287,7 +300,7 @@ def _sampled_circle(points: np.ndarray, part: np.ndarray) -> np.ndarray | None:
         )
     radius = np.hypot(*centre.T)
     centre += three[:, 0]
-    usable = np.isfinite(radius) & (radius > 4.0) & (radius < 2.0 * max(part.shape))
+    usable = np.isfinite(radius) & (radius > _LEAST_RADIUS) & (radius < 2.0 * max(part.shape))
     if not usable.any():
         return None
     circles = np.concatenate([centre, radius[:, None]], axis=-1)[usable]
@@ -339,7 +352,7 @@ def _crossings(values: np.ndarray, points: np.ndarray, outward: np.ndarray, span
     profile = ndimage.map_coordinates(values, where[..., ::-1].transpose(2, 0, 1), order=1, mode="nearest")
     outside = np.median(profile[:, along > 2.0], axis=1)
     noise = 1.4826 * np.median(np.abs(profile[:, along > 2.0] - outside[:, None]))
-    least = max(_STEP * span, _NOISE * noise)
+    least = max(_RISE * span, _RISE_NOISE * noise)
     first, third = (_outermost(profile, outside + k * least, along) for k in (1.0, 3.0))
     shifts = np.linspace(-0.5 * _REACH, 0.5 * _REACH, 81)
     left = np.array([_left_over(profile, along - shift) for shift in shifts])
@@ -376,13 +389,13 @@ def _outermost(profile: np.ndarray, level: np.ndarray, along: np.ndarray) -> np.
 
 
 def _span(values: np.ndarray, part: np.ndarray) -> float:
-    """Of a part above what is around it."""
-    return float(np.percentile(values[part], 99.0) - (np.median(values[~part]) if not part.all() else 0.0))
+    """Of a part, apart from its highlights, above what is around it."""
+    return float(np.median(values[part]) - (np.median(values[~part]) if not part.all() else 0.0))
 
 
 def _precise_circle(
     start: np.ndarray, part: np.ndarray, values: np.ndarray, picture: _Picture, camera: PixelCamera
-) -> Circle:
+) -> Circle | None:
     from scipy.optimize import least_squares
 
     span = _span(values, part)
@@ -395,7 +408,7 @@ def _precise_circle(
     points = points + off[:, None] * outward
     good = np.isfinite(off) & (np.abs(off) < _tolerance(start[2]) + 1.0)
     if good.sum() < 12:
-        raise DataError(_NOT_ROUND)
+        return None
     points = picture.place(points[good])
     places = picture.place(start[:2])
     scale = picture.step
@@ -423,7 +436,7 @@ def _precise_circle(
         r = focal * math.tan(float(fit.x[2]))
     residual = fit.fun[np.abs(fit.fun) < 1.0 * scale]
     if len(residual) < 12:
-        raise DataError(_NOT_ROUND)
+        return None
     arc = _arc(np.array([x, y, r]), points[np.abs(fit.fun) < 1.0 * scale])
     return Circle(x, y, r, arc, float(np.sqrt(np.mean(residual**2))))
 
@@ -473,7 +486,7 @@ def _line(points: np.ndarray) -> np.ndarray:
 
 def _precise_bar(
     lines: list[np.ndarray], points: np.ndarray, part: np.ndarray, values: np.ndarray, picture: _Picture
-) -> Bar:
+) -> Bar | None:
     edges, off_line = [], []
     for line in lines:
         on = points[np.abs(points @ line[:2] - line[2]) < 1.5]
@@ -484,7 +497,7 @@ def _precise_bar(
         off = _crossings(values, start, np.broadcast_to(-inward, start.shape), _span(values, part))
         moved = (start - off[:, None] * inward)[np.abs(off) < 3.0]
         if len(moved) < 0.5 * len(start):
-            raise DataError(_SOFT_EDGE)
+            return None
         fitted = _line(moved)
         distance = moved @ fitted[:2] - fitted[2]
         moved = moved[np.abs(distance) < 3.0 * max(1.4826 * float(np.median(np.abs(distance))), 0.05)]
