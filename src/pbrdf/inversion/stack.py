@@ -116,7 +116,7 @@ class Stack:
         *,
         noise: Noise | None = None,
         objective: str = "stokes",
-        covariance: np.ndarray | None = None,
+        covariance: tuple[Sequence[str], np.ndarray] | None = None,
         group: np.ndarray | None = None,
         wavelength: np.ndarray | None = None,
     ) -> Stack:
@@ -136,8 +136,8 @@ class Stack:
         noise, objective
             See :meth:`Observations.from_dataset`.
         covariance
-            Covariance of the measured Stokes components at each geometry, shape (G, C, C), on the data's own scale, for
-            all data sets; it replaces all other statements of noise.
+            Names of Stokes components and their covariance at each geometry, shape (G, C, C), on the data's own scale,
+            for all data sets; it replaces all other statements of noise.
         group, wavelength
             Shape (G,).
 
@@ -181,7 +181,7 @@ class Stack:
             scale=None if quantity in ("brdf", "normalised") else found.scale.T,
         )
         if covariance is not None:
-            return stack._with_covariance(covariance)
+            return stack._with_covariance(*covariance)
         if noise is not None or objective == "paper":
             return stack
         if found.turned is not None and found.turned.any():
@@ -291,24 +291,12 @@ class Stack:
         found: list[Any] = self._uploaded[key]
         return found
 
-    def _with_covariance(self, covariance: np.ndarray) -> Stack:
-        """With the covariance of the channels at each geometry, shape (G, C, C), for all data sets."""
-        covariance = np.asarray(covariance, dtype=float)
+    def _with_covariance(self, names: Sequence[str], covariance: np.ndarray) -> Stack:
+        """With the covariance of channels at each geometry, shape (G, C, C), for all data sets."""
         size = len(self.channels)
-        if covariance.shape != (self.points, size, size):
-            raise FitError(
-                f"covariance has shape {covariance.shape}: it must be ({self.points}, {size}, {size}), for every "
-                f"geometry the covariance of {', '.join(self.channels)}"
-            )
-        diagonal = np.sqrt(np.maximum(np.einsum("gcc->cg", covariance), 0.0))[..., None]
-        even = np.abs(covariance - covariance.transpose(0, 2, 1)) <= 1e-9 * np.abs(covariance).max(
-            axis=(1, 2), keepdims=True
-        )
-        if not (np.isfinite(covariance).all() and even.all() and (diagonal > 0.0).all()):
-            bad = ~(np.isfinite(covariance) & even).all(axis=(1, 2)) | ~(diagonal[..., 0] > 0.0).all(axis=0)
-            raise FitError(
-                f"covariance of geometry {int(np.argmax(bad))} is not symmetric and positive definite"
-            )
+        index = [names.index(name) for name in self.channels]
+        covariance = covariance[:, index][:, :, index]
+        diagonal = np.sqrt(np.einsum("gcc->cg", covariance))[..., None]
         scale = np.ones((size, 1, 1))
         if self.scale is not None:
             scale = np.stack(

@@ -154,9 +154,16 @@ def test_one_stated_covariance_for_all_pixels(data):
     matrix = covariances(data, -0.3)[:, 0, 0, :3, :3]
     found = compare(data, covariance=matrix, **FEW)
     assert found.attrs["noise"].startswith("stated")
+    # a block in which one component was not measured
+    without = data.assign(U=data["U"].where(data["y"] > 0.0))
+    part = pbrdf.fit_map(without, covariance=matrix, block={"y": 1}, **FEW)
+    np.testing.assert_allclose(part["chi2"][1], found["chi2"][1], rtol=1e-6)
+    assert part["degrees_of_freedom"].values.tolist() == [[38, 38], [59, 59]]
     with pytest.raises(pbrdf.FitError, match=r"covariance has shape \(3, 3\)"):
         pbrdf.fit_map(data, covariance=matrix[0], **FEW)
-    with pytest.raises(pbrdf.FitError, match="not symmetric and positive definite"):
+    with pytest.raises(
+        pbrdf.FitError, match=r"covariance of geometry 0 is not symmetric and positive definite"
+    ):
         pbrdf.fit_map(data, covariance=-matrix, **FEW)
 
 

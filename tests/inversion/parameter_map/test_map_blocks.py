@@ -78,6 +78,25 @@ def test_dask_arrays_stay_lazy(data):
     assert [v.dtype for v in found.data_vars.values()] == [v.dtype for v in eager.data_vars.values()]
 
 
+def test_masks_labels_and_directions_of_each_pixel_with_dask(data):
+    pytest.importorskip("dask.array")
+    mask = np.ones((9, 7), dtype=bool)
+    mask[3:6, 2] = False
+    label = np.ones((9, 7), dtype=int)
+    label[0] = 0
+    over = ("y", "x")
+    dataset = data.assign_coords(mask=(over, mask), height=(over, 1.0 * label))
+    dataset["phi"] = dataset["phi"] + 0.0 * data["I"]
+    dataset["region"] = (over, label)
+    eager = pbrdf.fit_map(dataset, labels="region", block={"y": 5, "x": 7}, **FEW)
+    for lazy in (dataset.chunk(y=5), dataset.assign({n: dataset[n].chunk(y=5) for n in "IQU"})):
+        computed = pbrdf.fit_map(lazy, labels="region", **FEW).compute()
+        for name in eager.data_vars:
+            np.testing.assert_array_equal(computed[name].values, eager[name].values)
+    assert (eager["status"] == 5).sum() == 10
+    assert eager["height"].dims == over
+
+
 def test_dask_arrays_that_cannot_stay_lazy_are_refused(data):
     pytest.importorskip("dask.array")
     with pytest.raises(

@@ -36,7 +36,7 @@ _ATTRIBUTES: dict[str, dict[str, Any]] = {
     "standard_error": {"long_name": "standard error, NaN on a bound, undetermined or not converged"},
     "correlation": {"long_name": "correlation of the estimates", "units": "1"},
     "chi2": {"long_name": "sum of the squared weighted residuals", "units": "1"},
-    "degrees_of_freedom": {"long_name": "measured values less free parameters", "units": "1"},
+    "degrees_of_freedom": {"long_name": "measured values less the pixel's own free parameters", "units": "1"},
     "optima": {"long_name": "distinct optima that were seen", "units": "1"},
     "starts": {"long_name": "starts that were followed", "units": "1"},
     "status": {

@@ -171,7 +171,7 @@ max_iterations, share, correlation
             "bounds": dict(bounds or {}),
             "noise": noise,
             "objective": objective,
-            "covariance": covariance,
+            "covariance": None if covariance is None else (like.channels, covariance),
             "words": _words(noise, covariance, like, dataset),
         }
         coords = {
