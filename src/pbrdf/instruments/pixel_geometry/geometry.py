@@ -90,7 +90,7 @@ class PixelGeometry(ABC):
         ----------
         stokes
             The whole pictures, as ``pbrdf reduce`` writes them; numbers are read only where something has to be found
-            in a picture, and then a part of them.
+            in a picture, and then S0 and the flags, some rows at a time.
 
         Raises
         ------

@@ -23,8 +23,8 @@ from pbrdf.instruments.pixel_geometry.camera import PixelCamera
 
 __all__ = ["Bar", "Circle", "find_bar", "find_circle", "sample_picture"]
 
-#: Larger pictures are thinned to about so many pixels to look for the sample.
-_MOST_PIXELS = 2**21
+#: Larger pictures are averaged down to about so many pixels to look for the sample; numbers read at a time.
+_MOST_PIXELS, _READ = 2**21, 2**22
 #: Steps above the background that are tried, in parts of the picture's range, the lower ones for dark samples with
 #: bright highlights; and the least, in noise of the background.
 _STEPS, _NOISE = (0.03, 0.003, 0.0003), 6.0
@@ -34,7 +34,7 @@ _RISE, _RISE_NOISE = 0.06, 3.0
 _PARTS = 3
 #: Random samples of outline points; they are the same ones in every run.
 _TRIALS = 400
-#: Smaller balls and cylinders are highlights, or specks, pixels of the thinned picture.
+#: Smaller balls and cylinders are highlights, or specks; pixels of the picture averaged down.
 _LEAST_RADIUS = 4.0
 #: What an outline must have in common with the circle: share of the whole circle, of the outline, of the area.
 _ARC, _SHARE, _INSIDE = 0.25, 0.35, 0.9
@@ -109,45 +109,58 @@ class Bar:
 
 @dataclass(frozen=True)
 class _Picture:
-    """A thinned picture, whose pixels are `step` apart in the whole one."""
+    """A picture whose pixels are `step` of the whole one along each side."""
 
     values: np.ndarray
     step: int
 
     def place(self, points: np.ndarray) -> np.ndarray:
         """Places (x, y) in the whole picture of indices (column, row), shapes (..., 2)."""
-        return points * self.step + 0.5
+        return (points + 0.5) * self.step
 
 
 def sample_picture(stokes: xr.Dataset) -> tuple[np.ndarray, int]:
-    """S0 to look for a sample in: the brightest of the series at each pixel, thinned to every so manieth pixel.
+    """S0 to look for a sample in: the brightest of the series at each pixel, of large pictures means of square blocks.
 
     Returns
     -------
     values, step
-        Shape (rows, columns), NaN where nothing was measured; the pixels taken are `step` apart.
+        Shape (rows, columns), NaN where nothing was measured; `step` pixels along each side are one.
 
     Raises
     ------
     DataError
         If nothing was measured anywhere.
     """
-    step = max(1, math.isqrt(stokes.sizes["y"] * stokes.sizes["x"] // _MOST_PIXELS))
-    thin = stokes.isel(y=slice(None, None, step), x=slice(None, None, step))
-    brightest = np.full((thin.sizes["y"], thin.sizes["x"]), -np.inf)
+    rows, columns = stokes.sizes["y"], stokes.sizes["x"]
+    step = max(1, math.ceil(math.sqrt(rows * columns / _MOST_PIXELS)))
+    brightest = np.full((rows // step, columns // step), -np.inf)
     saturated = np.zeros(brightest.shape, dtype=bool)
+    height = max(1, _READ // (columns * step))
     for i in range(stokes.sizes.get("series", 1)):
-        one = thin.isel(series=i) if "series" in thin.dims else thin
-        values = one["I"].transpose("y", "x").values.astype(float)
-        brightest = np.fmax(brightest, values)
-        if "flags" in one:
-            # PixelFlag.SATURATED
-            saturated |= (one["flags"].transpose("y", "x").values & 1) != 0
+        one = stokes.isel(series=i) if "series" in stokes.dims else stokes
+        for first in range(0, len(brightest), height):
+            part = slice(first, first + height)
+            block = one.isel(y=slice(first * step, min(first + height, len(brightest)) * step))
+            values = _blocks(block["I"], step)
+            count = np.isfinite(values).sum(axis=(1, 3))
+            mean = np.nansum(values, axis=(1, 3)) / np.maximum(count, 1)
+            brightest[part] = np.fmax(brightest[part], np.where(count > 0, mean, np.nan))
+            if "flags" in one:
+                # PixelFlag.SATURATED
+                saturated[part] |= ((_blocks(block["flags"], step) & 1) != 0).any(axis=(1, 3))
     found = np.isfinite(brightest)
     if not found.any():
         raise DataError("no pixel was measured: there is nothing to find in the picture")
     brightest = np.where(found, brightest, np.nan)
     return np.where(saturated, np.nanmax(brightest), brightest), step
+
+
+def _blocks(array: xr.DataArray, step: int) -> np.ndarray:
+    """Square blocks of whole pictures, shape (rows, step, columns, step); what is left over at the end is cut off."""
+    values = array.transpose("y", "x").values
+    rows, columns = (n // step for n in values.shape)
+    return values[: rows * step, : columns * step].reshape(rows, step, columns, step)
 
 
 def find_circle(stokes: xr.Dataset, camera: PixelCamera) -> Circle:
