@@ -52,11 +52,34 @@ def test_pixels_without_a_result_have_colours_of_their_own():
     shown = ShownMap(found)
     figure = overview_figure(shown, "paint")
     image, *others = panels(figure)[0].images
-    np.testing.assert_array_equal(~np.ma.getmaskarray(image.get_array()), shown.good)
+    np.testing.assert_array_equal(~np.ma.getmaskarray(image.get_array()), shown.determined(0))
     drawn = [~np.ma.getmaskarray(other.get_array()) for other in others]
+    np.testing.assert_array_equal(drawn.pop(0), shown.good & ~shown.determined(0))
     np.testing.assert_array_equal(drawn[0], ~(shown.good | shown.masked | shown.pending))
     np.testing.assert_array_equal(drawn[1], shown.pending)
-    assert legend(figure) == ["not measured or left out", "no result", "not yet fitted"]
+    assert legend(figure) == ["not measured or left out", "no result", "not yet fitted", "undetermined"]
+
+
+def test_what_the_data_do_not_determine_has_no_colour_of_the_scale():
+    """Its values mean nothing, however large: such pixels stand apart, and outside of the scale."""
+    found = example_map((40, 40), parameters=1, cause=False)
+    undetermined = np.zeros((40, 40), dtype=bool)
+    undetermined[:10] = True
+    found["flags"][0] = np.where(undetermined, 4, 0)
+    found["estimate"][0] = np.where(undetermined, 1e3, found["estimate"][0])
+    found["standard_error"][0] = np.where(undetermined, np.nan, found["standard_error"][0])
+    found["standard_error"][0, 20] = np.nan
+    figure = parameter_figure(ShownMap(found), 0, "paint")
+    value, error, histogram = panels(figure)
+    assert value.images[0].norm.vmax < 1.0
+    assert histogram.get_xlim()[1] < 1.0
+    for ax, others in (
+        (value, [undetermined]),
+        (error, [undetermined, np.arange(40)[:, None] * np.ones(40) == 20]),
+    ):
+        drawn = [~np.ma.getmaskarray(image.get_array()) for image in ax.images[1:]]
+        np.testing.assert_array_equal(drawn, others)
+    assert legend(figure) == ["undetermined", "on a bound: no standard error"]
 
 
 def test_the_error_stands_beside_the_value_and_goes_to_a_logarithm_where_it_is_wide():

@@ -75,7 +75,9 @@ def test_the_quick_look_fills_and_is_drawn_now_and_then(tmp_path, monkeypatch):
     stored = whole.copy(deep=True)
     stored["status"][:] = -1
     monkeypatch.setattr("pbrdf.report.parameter_map.quicklook.open_map", lambda path, partial: stored)
-    store = Store(tmp_path / "paint.zarr", UnitGrid.of({"y": 40, "x": 40}, {"y": 10, "x": 40}, {"y": 10, "x": 40}))
+    store = Store(
+        tmp_path / "paint.zarr", UnitGrid.of({"y": 40, "x": 40}, {"y": 10, "x": 40}, {"y": 10, "x": 40})
+    )
     look = QuickLook(store, tmp_path / "report" / "look.png", every=5.0)
 
     def missing():

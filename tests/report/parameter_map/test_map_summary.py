@@ -19,7 +19,9 @@ def test_medians_shares_and_counts():
     found = example_map((60, 50))
     summary = summary_of(found)
     good = found["status"].values == 0
-    p = summary.parameters[0]
+    p, b = summary.parameters[0], summary.parameters[-1]
+    known = good & (found["flags"].values[-1] != 4)
+    assert b.median == np.median(found["estimate"].values[-1][known])
     assert p.median == np.median(found["estimate"].values[0][good])
     low, high = np.percentile(found["estimate"].values[0][good], (16, 84))
     assert p.spread == pytest.approx(0.5 * (high - low))

@@ -29,6 +29,10 @@ def test_of_a_large_map_every_nth_pixel_is_shown_and_said():
     shown = ShownMap(found, window)
     np.testing.assert_array_equal(shown.estimate, found["estimate"].values[:, ::5, ::4])
     assert window.words() == "every 5th pixel along y; every 4th pixel along x"
+    assert Window.of(example_map((50, 44), parameters=1), most=22).words() == (
+        "every 3rd pixel along y; every 2nd pixel along x"
+    )
+    assert Window.of(example_map((44, 44), parameters=1), most=22).words() == "every 2nd pixel along y and x"
     assert shown.coordinates["y"] == (pytest.approx(np.arange(0, 50, 5)), "y, pixels")
 
 

@@ -8,6 +8,7 @@ fit would darken all others: each figure says so.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,11 +30,13 @@ LEFT_OUT = 1.0
 HELD = f"scales hold the middle {100.0 - 2.0 * LEFT_OUT:g} % of the pixels"
 _VALUES, _ERRORS = "viridis", "cividis"
 _MASKED, _HATCH, _NO_RESULT, _PENDING = "#D9D9D9", "#A6A6A6", "#D55E00", "#FFFFFF"
+#: A parameter that the data of a pixel do not determine, and one on a bound in the map of standard errors.
+_UNDETERMINED, _ON_BOUND = "#CC79A7", "#009E73"
 #: Colours of the states of a pixel, those of other names after them.
 _STATES = {
     GOOD: "#56B4E9",
     "not_converged": "#E69F00",
-    "too_few_values": "#CC79A7",
+    "too_few_values": "#F0E442",
     "failed": _NO_RESULT,
     **dict.fromkeys(WITHOUT, _MASKED),
     PENDING: _PENDING,
@@ -85,7 +88,7 @@ def overview_figure(shown: ShownMap, title: str) -> Figure:
             ax.set_title(shown.labels[k].text)
             _draw_values(ax, shown, k)
             _label_axes(ax, shown, down=place % columns == 0, across=place + columns >= len(drawn))
-        _legend(figure, shown)
+        _legend(figure, shown, drawn)
         return figure
 
 
@@ -113,7 +116,7 @@ def parameter_figure(shown: ShownMap, parameter: int, title: str) -> Figure:
         for ax in (value, error):
             _label_axes(ax, shown, down=ax is value, across=True)
         _draw_histogram(histogram, shown, parameter)
-        _legend(figure, shown)
+        _legend(figure, shown, [parameter], errors=True)
         return figure
 
 
@@ -278,10 +281,12 @@ def _plain_ticks(axis: Any) -> None:
     axis.set_minor_formatter(NullFormatter())
 
 
-def _legend(figure: Figure, shown: ShownMap) -> None:
-    """Name the colours of the pixels without a value."""
+def _legend(figure: Figure, shown: ShownMap, parameters: Sequence[int] = (), *, errors: bool = False) -> None:
+    """Name the colours of the pixels without a value, or without a standard error."""
     from matplotlib.patches import Patch
 
+    undetermined = [shown.good & ~shown.determined(k) for k in parameters]
+    without = [shown.determined(k) & ~np.isfinite(shown.standard_error[k]) for k in parameters if errors]
     handles = []
     for where, words, options in (
         (
@@ -291,6 +296,8 @@ def _legend(figure: Figure, shown: ShownMap) -> None:
         ),
         (_without_result(shown), "no result", {"color": _NO_RESULT}),
         (shown.pending, "not yet fitted", {"facecolor": _PENDING, "edgecolor": "black"}),
+        (np.array(undetermined), "undetermined", {"color": _UNDETERMINED}),
+        (np.array(without), "on a bound: no standard error", {"color": _ON_BOUND}),
     ):
         if where.any():
             handles.append(Patch(label=words, linewidth=0.6, **options))
@@ -302,9 +309,10 @@ def _legend(figure: Figure, shown: ShownMap) -> None:
 
 
 def _draw_values(ax: Axes, shown: ShownMap, parameter: int, *, band: bool = False) -> None:
-    label, values, good = shown.labels[parameter], shown.estimate[parameter], shown.good
+    label, values, good = shown.labels[parameter], shown.estimate[parameter], shown.determined(parameter)
     low, high = _scale(values[good])
     if len(shown.window.dims) == 1:
+        values = np.where(good, values, np.nan)
         _line(ax, shown, values, shown.standard_error[parameter] if band else None)
         ax.set_ylabel(label.unit)
         margin = 0.15 * (high - low)
@@ -312,6 +320,7 @@ def _draw_values(ax: Axes, shown: ShownMap, parameter: int, *, band: bool = Fals
         return
     _ground(ax)
     image = _picture(ax, shown, values, good & np.isfinite(values), cmap=_VALUES, vmin=low, vmax=high)
+    _plain(ax, shown, shown.good & ~good, _UNDETERMINED)
     _others(ax, shown)
     _bar(ax, image, label.unit, values[good], low, high)
 
@@ -340,8 +349,10 @@ def _draw_errors(ax: Axes, shown: ShownMap, parameter: int | None) -> None:
     _ground(ax)
     norm = LogNorm(low, high) if wide else Normalize(low, high)
     image = _picture(ax, shown, values, where, cmap=_ERRORS, norm=norm)
-    # a fit without a standard error has one parameter that the data do not determine
-    _plain(ax, shown, shown.good & ~where, _PENDING)
+    if parameter is not None:
+        determined = shown.determined(parameter)
+        _plain(ax, shown, shown.good & ~determined, _UNDETERMINED)
+        _plain(ax, shown, determined & ~where, _ON_BOUND)
     _others(ax, shown)
     _bar(ax, image, unit, values[where], low, high)
 
@@ -447,13 +458,13 @@ def _draw_counts(ax: Axes, shown: ShownMap, counts: np.ndarray, first: int) -> N
 
 def _draw_histogram(ax: Axes, shown: ShownMap, parameter: int) -> None:
     """How values are spread, with the middle, and how far off a single one may be."""
-    label, good = shown.labels[parameter], shown.good
+    label, good = shown.labels[parameter], shown.determined(parameter)
     values = shown.estimate[parameter][good]
     values = values[np.isfinite(values)]
     ax.set_xlabel(label.with_unit)
     ax.set_ylabel("pixels")
     if values.size == 0:
-        ax.text(0.5, 0.5, "no pixel has a result", transform=ax.transAxes, ha="center", color=GREY)
+        ax.text(0.5, 0.5, "no pixel determines it", transform=ax.transAxes, ha="center", color=GREY)
         return
     low, high = _scale(values)
     ax.hist(values, bins=_bins(values), range=(low, high), color=BLUE, alpha=0.75)

@@ -67,7 +67,7 @@ def _found(summary: MapSummary) -> Iterator[Markup]:
     described = {p.label.text: p.label.description for p in summary.parameters}
     rows = [[row[0], described[row[0]], *row[1:]] for row in parameter_rows(summary)]
     yield table(
-        "Parameters over the pixels with a result. Spread: half the range of the middle 68 % of the pixels, which for "
+        "Parameters over the pixels with a result that determine them. Spread: half the range of the middle 68 % of the pixels, which for "
         "normal scatter is its standard deviation; standard error: the median of the pixels' own. A spread no larger "
         "than the standard error is noise.",
         [

@@ -170,9 +170,12 @@ class Window:
 
     def words(self) -> str:
         """What is not shown; empty if that is nothing."""
+        by_step: dict[int, list[str]] = {}
+        for dim, step in zip(self.dims, self.steps, strict=True):
+            by_step.setdefault(step, []).append(dim)
         parts = [
-            f"every {_ordinal(step)} pixel along {dim}"
-            for dim, step in zip(self.dims, self.steps, strict=True)
+            f"every {_ordinal(step)} pixel along {' and '.join(dims)}"
+            for step, dims in by_step.items()
             if step > 1
         ]
         parts += [f"{dim}: the first only" for dim in self.others]
@@ -314,8 +317,12 @@ class ShownMap:
         """Which parameters of which pixels lie at a bound."""
         return self.flagged("at_lower_bound", "at_upper_bound")
 
+    def determined(self, parameter: int) -> np.ndarray:
+        """Pixels with a result whose data determine a parameter: elsewhere its value means nothing."""
+        return self.good & ~self.flagged("undetermined")[parameter]
+
     def varies(self, parameter: int) -> bool:
-        """Whether a parameter differs from pixel to pixel; those that are held or shared do not."""
+        """Whether a parameter differs from pixel to pixel; those that are shared do not."""
         values = self.estimate[parameter][self.good]
         return values.size > 0 and bool(np.ptp(values) > 0.0)
 

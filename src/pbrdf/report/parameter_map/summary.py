@@ -38,7 +38,7 @@ class ParameterSummary:
     label
         Of the parameter.
     median, spread
-        Middle, and half the range of the middle 68 % of the pixels.
+        Middle, and half the range of the middle 68 %, of the pixels that determine it.
     standard_error
         Median of the pixels' own.
     at_bounds, undetermined
@@ -201,13 +201,13 @@ def count_states(dataset: xr.Dataset, shown: ShownMap) -> dict[str, int]:
 
 
 def _of_parameter(shown: ShownMap, k: int) -> ParameterSummary:
-    good = shown.good
-    values = shown.estimate[k][good]
+    determined = shown.determined(k)
+    values = shown.estimate[k][determined]
     values = values[np.isfinite(values)]
-    errors = shown.standard_error[k][good]
+    errors = shown.standard_error[k][determined]
     errors = errors[np.isfinite(errors)]
     low, middle, high = np.percentile(values, (16.0, 50.0, 84.0)) if values.size else (math.nan,) * 3
-    count = max(int(good.sum()), 1)
+    count = max(int(shown.good.sum()), 1)
     return ParameterSummary(
         shown.labels[k],
         float(middle),
