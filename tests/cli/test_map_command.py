@@ -166,6 +166,21 @@ def test_two_workers_fill_what_one_process_fills(at_trial, tmp_path, whole):
 
 
 @pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning")
+def test_the_workers_of_a_scheduler_fill_what_one_process_fills(at_trial, tmp_path, whole, monkeypatch):
+    distributed = pytest.importorskip("distributed")
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(filter(None, sys.path)))
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=50
+    ) as cluster:
+        at_trial(
+            "map", "trial/reduced/stokes.zarr", "-g", "flat", "-o", "paint.zarr", *FIT, "--unit", 8,
+            "--scheduler", cluster.scheduler_address, "-q",
+        )  # fmt: skip
+    same(opened(tmp_path / "paint.zarr"), opened(whole))
+
+
+@pytest.mark.slow
 def test_interrupted_it_goes_on_where_it_was(at_trial, tmp_path, whole, monkeypatch):
     common = ("map", "trial/reduced/stokes.zarr", "-g", "flat", "-o", "paint.zarr", *FIT, "--unit", 8)
     do, done = MapStore.do, []
@@ -181,7 +196,9 @@ def test_interrupted_it_goes_on_where_it_was(at_trial, tmp_path, whole, monkeypa
     assert result.stderr.splitlines()[-1] == (
         "pbrdf: error: interrupted; 3 of 8 units are kept in paint.zarr: the same command goes on from there"
     )
-    monkeypatch.setattr(MapStore, "do", lambda self, number, progress: (done.append(number), do(self, number, progress)))
+    monkeypatch.setattr(
+        MapStore, "do", lambda self, number, progress: (done.append(number), do(self, number, progress))
+    )
     at_trial(*common, "-q")
     assert sorted(done) == list(range(8))
     same(opened(tmp_path / "paint.zarr"), opened(whole))

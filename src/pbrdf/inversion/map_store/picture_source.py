@@ -197,7 +197,7 @@ def _plain(value: Any) -> Any:
     if isinstance(value, np.ndarray):
         return {
             "shape": list(value.shape),
-            "digest": hashlib.sha256(np.ascontiguousarray(value)).hexdigest(),
+            "digest": hashlib.sha256(np.ascontiguousarray(value).tobytes()).hexdigest(),
         }
     if isinstance(value, xr.Dataset):
         return {str(name): _plain(variable.values) for name, variable in value.variables.items()}

@@ -10,6 +10,7 @@ import dataclasses
 import zipfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -64,8 +65,8 @@ def with_shared(
         assert solved.shared is not None
         found = solved.shared
         with atomic_file(path) as beside, beside.open("wb") as file:
-            fields = {f.name: np.asarray(getattr(found, f.name)) for f in dataclasses.fields(found)}
-            np.savez(file, **fields, **{_DIGEST: np.asarray(digest)})
+            fields: dict[str, Any] = {f.name: getattr(found, f.name) for f in dataclasses.fields(found)}
+            np.savez(file, **(fields | {_DIGEST: digest}))
     return fit.with_shared(found)
 
 

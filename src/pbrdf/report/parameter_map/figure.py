@@ -265,9 +265,10 @@ def _bar(ax: Axes, image: Any, label: str, values: np.ndarray, low: float, high:
     bar = ax.figure.colorbar(
         image, cax=ax.inset_axes((1.0, 0.0, 0.05, 1.0), transform=beside(ax)), label=label, extend=extend
     )
-    if hasattr(bar.formatter, "set_useOffset"):
-        bar.formatter.set_useOffset(False)
-        bar.formatter.set_powerlimits((-3, 5))
+    formatter: Any = bar.formatter
+    if hasattr(formatter, "set_useOffset"):
+        formatter.set_useOffset(False)
+        formatter.set_powerlimits((-3, 5))
     else:
         _plain_ticks(bar.ax.yaxis)
 
@@ -288,7 +289,7 @@ def _legend(figure: Figure, shown: ShownMap, parameters: Sequence[int] = (), *, 
     undetermined = [shown.good & ~shown.determined(k) for k in parameters]
     without = [shown.determined(k) & ~np.isfinite(shown.standard_error[k]) for k in parameters if errors]
     handles = []
-    for where, words, options in (
+    kinds: tuple[tuple[np.ndarray, str, dict[str, Any]], ...] = (
         (
             shown.masked,
             "not measured or left out",
@@ -298,7 +299,8 @@ def _legend(figure: Figure, shown: ShownMap, parameters: Sequence[int] = (), *, 
         (shown.pending, "not yet fitted", {"facecolor": _PENDING, "edgecolor": "black"}),
         (np.array(undetermined), "undetermined", {"color": _UNDETERMINED}),
         (np.array(without), "on a bound: no standard error", {"color": _ON_BOUND}),
-    ):
+    )
+    for where, words, options in kinds:
         if where.any():
             handles.append(Patch(label=words, linewidth=0.6, **options))
     if handles:
@@ -429,12 +431,13 @@ def _draw_states(ax: Axes, shown: ShownMap) -> None:
 
 def _draw_counts(ax: Axes, shown: ShownMap, counts: np.ndarray, first: int) -> None:
     from matplotlib.colors import BoundaryNorm, ListedColormap
+    from matplotlib.ticker import MaxNLocator
 
     good = shown.good
     if len(shown.window.dims) == 1:
         _line(ax, shown, counts.astype(float), None)
         ax.set_ylim(first - 0.5, max(int(counts.max(initial=first)), first + 1) + 0.5)
-        ax.yaxis.get_major_locator().set_params(integer=True)
+        ax.yaxis.set_major_locator(MaxNLocator(integer=True))
         return
     _ground(ax)
     most = int(counts[good].max(initial=first + 1))
@@ -451,7 +454,7 @@ def _draw_counts(ax: Axes, shown: ShownMap, counts: np.ndarray, first: int) -> N
     )
     _others(ax, shown)
     bar = ax.figure.colorbar(image, cax=ax.inset_axes((1.0, 0.0, 0.05, 1.0), transform=beside(ax)))
-    ticks = np.arange(first, last + 1)
+    ticks = list(range(first, last + 1))
     bar.set_ticks(ticks, labels=[*map(str, ticks[:-1]), f"≥ {last}" if most > last else str(last)])
     bar.ax.tick_params(length=0)
 
@@ -518,7 +521,7 @@ def _draw_goodness(ax: Axes, shown: ShownMap) -> None:
     edges = (
         np.geomspace(low, high, count + 1) if high > _WIDE * low > 0.0 else np.linspace(low, high, count + 1)
     )
-    ax.hist(values, bins=edges, color=BLUE, alpha=0.75, label="found")
+    ax.hist(values, bins=edges.tolist(), color=BLUE, alpha=0.75, label="found")
     if high > _WIDE * low > 0.0:
         ax.set_xscale("log")
         _plain_ticks(ax.xaxis)

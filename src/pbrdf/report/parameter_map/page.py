@@ -67,9 +67,9 @@ def _found(summary: MapSummary) -> Iterator[Markup]:
     described = {p.label.text: p.label.description for p in summary.parameters}
     rows = [[row[0], described[row[0]], *row[1:]] for row in parameter_rows(summary)]
     yield table(
-        "Parameters over the pixels with a result that determine them. Spread: half the range of the middle 68 % of the pixels, which for "
-        "normal scatter is its standard deviation; standard error: the median of the pixels' own. A spread no larger "
-        "than the standard error is noise.",
+        "Parameters over the pixels that determine them. Spread: half the range of the middle 68 %, which for normal "
+        "scatter is its standard deviation; standard error: the median of the pixels' own. A spread no larger than the "
+        "standard error is noise.",
         [
             "parameter",
             "meaning",

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 __all__ = ["QuickLook"]
 
 #: Seconds between two pictures at least; drawing takes no more than one part in so many of the time.
-_EVERY, _PART = 5.0, 20.0
+_EVERY, _PART = 5.0, 10.0
 #: Pixels along the longer side of the picture.
 _PIXELS = 240
 
@@ -50,7 +50,7 @@ class QuickLook:
         from pbrdf.report.parameter_map.figure import overview_figure
         from pbrdf.report.style import save_figure
 
-        began = time.monotonic()
+        began = time.monotonic()  # without the time to load the plotting library
         with open_map(self._store.path, partial=True) as stored:
             if self._shown is None:
                 self._shown = ShownMap(stored, Window.of(stored, _PIXELS), empty=True)
