@@ -365,9 +365,8 @@ class _Signals:
         self.fixed = {name: dr.opaque(self.Float, value) for name, value in space.fixed.items()}
         self.absent = [p.name for p in model.parameters if p.vanishing and space.fixed.get(p.name) == 0.0]
         # arrays over the geometries and data sets: where these share them, one number for all
-        widths = [1 if getattr(stack, n).shape[1] == 1 else len(stack) for n in ("theta_i", "theta_r", "phi")]
-        self.strides = [dr.opaque(self.UInt32, width) for width in widths]
-        self.steps = [dr.opaque(self.UInt32, int(width > 1)) for width in widths]
+        width = stack.theta_i.shape[1]
+        self.stride, self.step = dr.opaque(self.UInt32, width), dr.opaque(self.UInt32, int(width > 1))
         self.angles = [stack.upload(name, self.Float)[0] for name in ("theta_i", "theta_r", "phi")]
         nuisances = {term.role for term in space.terms if term.nuisance}
         if "angle" in nuisances and (np.abs(np.sin(stack.phi)) > 1e-6).any():
@@ -410,10 +409,8 @@ class _Signals:
                 target = nuisances if term.nuisance else values
                 target[term.role] = dr.select(chosen, value, target[term.role])
         values |= dict.fromkeys(self.absent)
-        theta_i, theta_r, phi = (
-            dr.gather(self.Float, angle, point * stride + number * step)
-            for angle, stride, step in zip(self.angles, self.strides, self.steps, strict=True)
-        )
+        at = point * self.stride + number * self.step
+        theta_i, theta_r, phi = (dr.gather(self.Float, angle, at) for angle in self.angles)
         f, alive = measured_mueller(self.model, values, nuisances, theta_i, theta_r, phi)
         dark = None
         if "dark" in nuisances:

@@ -29,7 +29,7 @@ class Stack:
     Attributes
     ----------
     theta_i, theta_r, phi
-        Angles in radians, shape (G, 1) where all data sets share them, else (G, B).
+        Angles in radians, shape (G, 1) where all data sets share the three of them, else (G, B).
     channels, illumination
         As of one data set; the same for all. A channel may be missing in some.
     values, std
@@ -130,7 +130,7 @@ class Stack:
         columns
             Data variables of the schema by name, shape (G, B), matrices (4, 4, G, B).
         angles
-            ``theta_i``, ``theta_r``, ``phi`` in radians, shape (G, 1) or (G, B).
+            ``theta_i``, ``theta_r``, ``phi`` in radians, all of shape (G, 1) or all of (G, B).
         quantity, illumination
             Attributes of the data set.
         noise, objective

@@ -34,6 +34,7 @@ class Counting:
         return part
 
 
+@pytest.mark.slow
 def test_a_block_depends_on_itself_alone(data):
     prepared = pbrdf.MapFit.prepare(data, **FEW)
     block = data.isel(y=slice(4, 8), x=slice(0, 5))
@@ -47,12 +48,14 @@ def test_a_block_depends_on_itself_alone(data):
     xr.testing.assert_identical(part, first.drop_attrs())
 
 
+@pytest.mark.slow
 def test_blocks_of_other_sizes_find_the_same(data):
     one, other = pbrdf.fit_map(data, **FEW), pbrdf.fit_map(data, block=4, **FEW)
     off = (other["estimate"] - one["estimate"]) / one["standard_error"]
     assert float(np.abs(off).max()) < 1e-3
 
 
+@pytest.mark.slow
 def test_dask_arrays_stay_lazy(data):
     dask = pytest.importorskip("dask")
     da = pytest.importorskip("dask.array")
@@ -78,6 +81,7 @@ def test_dask_arrays_stay_lazy(data):
     assert [v.dtype for v in found.data_vars.values()] == [v.dtype for v in eager.data_vars.values()]
 
 
+@pytest.mark.slow
 def test_masks_labels_and_directions_of_each_pixel_with_dask(data):
     pytest.importorskip("dask.array")
     mask = np.ones((9, 7), dtype=bool)
@@ -110,6 +114,7 @@ def test_dask_arrays_that_cannot_stay_lazy_are_refused(data):
         pbrdf.fit_map(mixed, **FEW)
 
 
+@pytest.mark.slow
 def test_a_file_is_read_block_by_block(data, tmp_path):
     path = tmp_path / "stokes.nc"
     data.to_netcdf(path, engine="h5netcdf")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import pickle
 
 import numpy as np
 import pytest
@@ -123,6 +124,20 @@ def test_a_shared_parameter_on_its_bound(data):
     np.testing.assert_allclose(
         found["standard_error"].sel(parameter="a"), alone["standard_error"].sel(parameter="a"), rtol=1e-4
     )
+
+
+@pytest.mark.slow
+def test_whoever_fits_a_block_has_what_is_shared(data):
+    prepared = pbrdf.MapFit.prepare(data, fix=FIX, share="n", starts=8)
+    found = prepared.solve_shared([data.isel(y=[0]), data.isel(y=[1])])
+    assert json.loads(json.dumps(found.settings))["shared"]["1"] == [
+        float(found.fit_block(data)["estimate"][1, 0, 0])
+    ]
+    assert prepared.shared is None and found.shared.passes < 8
+    block = data.isel(y=[1], x=[0, 2])
+    again = pickle.loads(pickle.dumps(found)).fit_block(block)
+    xr.testing.assert_identical(again, found.fit_block(block))
+    assert [*found.template().data_vars] == [*again.data_vars] and again.attrs == found.template().attrs
 
 
 def test_blocks_need_what_is_shared_first(data):
