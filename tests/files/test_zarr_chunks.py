@@ -191,6 +191,7 @@ def test_declared_sizes_are_compared_with_the_folder(tmp_path, ds):
             r"\.zarray: not the description of an array \('six' are no lengths\): it is damaged",
         ),
         ({"shape": [True]}, "are no lengths"),
+        ({"shape": [10**400]}, "are no lengths"),
         ({"chunks": [0]}, "are no lengths"),
         ({"chunks": [6, 6]}, "chunks .6, 6. of an array of the shape .6."),
         ({"dimension_separator": 5}, "dimension_separator is 5"),

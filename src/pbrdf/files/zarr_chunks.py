@@ -319,7 +319,7 @@ def _zstd_lengths(chunk: Path, where: str, size: int) -> tuple[int | None, int]:
 
 
 def _lengths(value: Any, least: int) -> tuple[int, ...]:
-    if not isinstance(value, list) or not all(type(v) is int and v >= least for v in value):
+    if not isinstance(value, list) or not all(type(v) is int and least <= v < 2**63 for v in value):
         raise ValueError(f"{value!r} are no lengths")
     return tuple(value)
 
