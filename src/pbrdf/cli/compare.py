@@ -9,6 +9,7 @@ import typer
 
 from pbrdf.cli.command_line import command_line
 from pbrdf.cli.console import NOT_CONVERGED, output_console, stage_bar
+from pbrdf.cli.fit_options import Objective
 from pbrdf.cli.options import (
     Backend,
     data_argument,
@@ -72,9 +73,7 @@ def compare(
             show_default="the uncertainties in the data, else an assumption",
         ),
     ] = None,
-    objective: Annotated[
-        str, typer.Option(help="stokes (signed components), or paper: intensity and DoLP, equal weights.")
-    ] = "stokes",
+    objective: Objective = "stokes",
     seed: Annotated[int, seed_option("Seed of starts, folds and resampling.")] = 0,
     output: Annotated[
         Path | None, output_option("Folder for the results.", show_default="<file>-compare")

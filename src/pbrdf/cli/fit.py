@@ -5,28 +5,40 @@ from __future__ import annotations
 import functools
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
 from pbrdf.cli.command_line import command_line
 from pbrdf.cli.console import NOT_CONVERGED, output_console, stage_bar
+from pbrdf.cli.fit_options import (
+    Bounds,
+    FigureFormats,
+    FitNoise,
+    FittedModel,
+    Fix,
+    Free,
+    Iterations,
+    Loss,
+    ModelOptions,
+    Nuisances,
+    Objective,
+    Priors,
+    Start,
+    fit_arguments,
+    fitted_model,
+)
 from pbrdf.cli.options import (
     Backend,
-    noise_option,
     output_option,
     quiet_option,
     seed_option,
     with_reading_options,
 )
 from pbrdf.cli.reading import Reading
-from pbrdf.cli.values import bounds as read_bounds
-from pbrdf.cli.values import numbers, pairs
+from pbrdf.cli.values import pairs
 from pbrdf.cli.wavelengths import require_choice
 from pbrdf.errors import FitError, PbrdfError
-
-if TYPE_CHECKING:
-    from pbrdf.models import Model
 
 __all__ = ["fit"]
 
@@ -39,44 +51,15 @@ def fit(
     ],
     *,
     reading: Reading,
-    model: Annotated[
-        str,
-        typer.Option(
-            help="Model (see `pbrdf models`), FILE.py:Class, or a model's JSON file to start from as well."
-        ),
-    ] = "double-gauss",
-    option: Annotated[
-        list[str] | None,
-        typer.Option(help="Option of the model, e.g. shadowing=smith (repeatable).", metavar="NAME=VALUE"),
-    ] = None,
-    fix: Annotated[
-        list[str] | None,
-        typer.Option(help="Hold a parameter, e.g. n=1.5 (repeatable).", metavar="NAME=VALUE"),
-    ] = None,
-    free: Annotated[
-        list[str] | None,
-        typer.Option(help="Fit a parameter that is held otherwise, e.g. kappa (repeatable).", metavar="NAME"),
-    ] = None,
-    bounds: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="Bounds of a parameter, e.g. sigma=0.01:0.2 (repeatable).", metavar="NAME=LOW:HIGH"
-        ),
-    ] = None,
-    start: Annotated[
-        list[str] | None,
-        typer.Option(help="Value where every start begins, e.g. n=1.6 (repeatable).", metavar="NAME=VALUE"),
-    ] = None,
+    model: FittedModel = "double-gauss",
+    option: ModelOptions = None,
+    fix: Fix = None,
+    free: Free = None,
+    bounds: Bounds = None,
+    start: Start = None,
     starts: Annotated[int, typer.Option(help="Number of starts, spread over the bounds.")] = 64,
-    iterations: Annotated[int, typer.Option(help="Steps of each start at most.", min=1)] = 100,
-    noise: Annotated[
-        str | None,
-        noise_option(
-            "Noise relative to the intensity, and absolute in units of its median, e.g. 0.02,0.01; or equal; or "
-            "instrument:linear=1%,circular=5%,read=0.5,quantum=1.",
-            show_default="the uncertainties in the data, else an assumption that is printed",
-        ),
-    ] = None,
+    iterations: Iterations = 100,
+    noise: FitNoise = None,
     hold_out: Annotated[
         str | None,
         typer.Option(
@@ -97,18 +80,8 @@ def fit(
             show_default="4.5 sigma, revised as sigma is found",
         ),
     ] = None,
-    nuisance: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="What the instrument adds: gain, dark, angle or source (degrees), e.g. gain:group or "
-            "angle:group~0,0.1 (repeatable).",
-            metavar="KIND[:group][~MEAN,STD]",
-        ),
-    ] = None,
-    prior: Annotated[
-        list[str] | None,
-        typer.Option(help="Gaussian prior, e.g. n=1.55,0.05 (repeatable).", metavar="NAME=MEAN,STD"),
-    ] = None,
+    nuisance: Nuisances = None,
+    prior: Priors = None,
     split: Annotated[
         list[str] | None,
         typer.Option(
@@ -116,12 +89,8 @@ def fit(
             metavar="NAME=group|wavelength",
         ),
     ] = None,
-    objective: Annotated[
-        str, typer.Option(help="stokes (signed components), or paper: intensity and DoLP, equal weights.")
-    ] = "stokes",
-    loss: Annotated[
-        str, typer.Option(help="linear, or against outliers soft_l1, huber or cauchy.")
-    ] = "linear",
+    objective: Objective = "stokes",
+    loss: Loss = "linear",
     profile: Annotated[
         bool, typer.Option("--profile", help="Profile-likelihood intervals too: asymmetric, right at bounds.")
     ] = False,
@@ -154,9 +123,7 @@ def fit(
             show_default="<file>-fit",
         ),
     ] = None,
-    figure_format: Annotated[
-        str, typer.Option(help="Format of the figures: png, pdf or svg, or several: png,pdf.")
-    ] = "png",
+    figure_format: FigureFormats = "png",
     figures: Annotated[
         bool,
         typer.Option("--figures/--no-figures", help="Draw no figures: a page of numbers, sooner done."),
@@ -187,27 +154,26 @@ def fit(
     from pbrdf.report.style import leave_out_help_texts
 
     parse_formats(figure_format, "--figure-format")
-    arguments: dict[str, Any] = {
-        "options": pairs(option or (), "--option", "shadowing=smith"),
-        "fix": numbers(fix or (), "--fix", "n=1.5"),
-        "free": list(free or ()),
-        "bounds": read_bounds(bounds or (), "--bounds", "sigma=0.01:0.2"),
-        "start": numbers(start or (), "--start", "n=1.6"),
-        "starts": starts,
-        "max_iterations": iterations,
-        "noise": noise,
+    arguments = fit_arguments(
+        option=option,
+        fix=fix,
+        free=free,
+        bounds=bounds,
+        start=start,
+        starts=starts,
+        iterations=iterations,
+        noise=noise,
+        nuisance=nuisance,
+        prior=prior,
+        objective=objective,
+        loss=loss,
+        seed=seed,
+    ) | {
         "hold_out": hold_out,
         "strategy": strategy,
         "polish": polish,
         "diffuse_tilt": None if diffuse_tilt is None else math.radians(diffuse_tilt),
-        "nuisances": list(nuisance or ()),
-        "priors": {
-            name: _prior(name, text) for name, text in pairs(prior or (), "--prior", "n=1.55,0.05").items()
-        },
         "split": pairs(split or (), "--split", "a=wavelength"),
-        "objective": objective,
-        "loss": loss,
-        "seed": seed,
     }
     pairs_drawn = [_pair(text) for text in contour or ()]
     folders = _folders(files, output)
@@ -217,7 +183,7 @@ def fit(
         from pbrdf.backend import set_backend
 
         set_backend(backend)
-    chosen = _model(model)
+    chosen = fitted_model(model)
 
     from pbrdf.inversion import fit as fit_dataset
 
@@ -265,13 +231,6 @@ def fit(
         raise typer.Exit(NOT_CONVERGED)
 
 
-def _prior(name: str, text: str) -> tuple[float, float]:
-    """Mean and standard deviation of a prior."""
-    from pbrdf.inversion.nuisance import parse_prior
-
-    return parse_prior(f"--prior {name}", text)
-
-
 def _pair(text: str) -> tuple[str, str]:
     """Names of two parameters."""
     names = [name.strip() for name in text.split(",")]
@@ -289,10 +248,3 @@ def _folders(files: list[str], output: Path | None) -> list[Path]:
     if output is None:
         return [Path(f"{stem}-fit") for stem in stems]
     return [output] if len(files) == 1 else [output / stem for stem in stems]
-
-
-def _model(name: str) -> str | Model:
-    """A model to start from where a file is named, else the name of a model."""
-    from pbrdf.models import load_model
-
-    return load_model(name) if name.endswith(".json") else name

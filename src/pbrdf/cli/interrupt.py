@@ -14,18 +14,30 @@ import socket
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType
 
 from pbrdf.cli.console import fail
 
-__all__ = ["INTERRUPTED", "end", "heard_at_once"]
+__all__ = ["INTERRUPTED", "end", "heard_at_once", "say_when_interrupted", "what_is_said"]
 
 #: Exit code after Ctrl-C, that of a shell for a command that SIGINT ended.
 INTERRUPTED = 130
 #: What Python has to come out of a kernel, and then to leave in good order, seconds.
 _PATIENCE, _TO_LEAVE = 1.0, 0.8
+_INTERRUPTED = "interrupted"
+_said: list[Callable[[], str]] = [lambda: _INTERRUPTED]
+
+
+def say_when_interrupted(sentence: Callable[[], str] = lambda: _INTERRUPTED) -> None:
+    """Choose the line on Ctrl-C from now on: a command that leaves something says what, and how to go on."""
+    _said[0] = sentence
+
+
+def what_is_said() -> str:
+    """The line on Ctrl-C."""
+    return _said[0]()
 
 
 @contextmanager
@@ -71,5 +83,5 @@ def _watch(receiver: socket.socket, heard: threading.Event) -> None:
             if signals[0] == signal.SIGINT:
                 if heard.wait(_PATIENCE):
                     time.sleep(_TO_LEAVE)
-                fail("interrupted")
+                fail(what_is_said())
                 end()

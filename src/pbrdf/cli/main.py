@@ -23,7 +23,7 @@ from typer.core import TyperGroup
 
 from pbrdf.cli.command_line import given_arguments, remember_arguments
 from pbrdf.cli.console import fail, warn
-from pbrdf.cli.interrupt import INTERRUPTED, end, heard_at_once
+from pbrdf.cli.interrupt import INTERRUPTED, end, heard_at_once, say_when_interrupted, what_is_said
 from pbrdf.cli.options import ReadingCommand
 from pbrdf.cli.values import refuse_odd_numbers
 from pbrdf.errors import PbrdfError, PluginWarning
@@ -33,10 +33,12 @@ __all__ = ["app", "main"]
 
 #: Exit code where the input, and not the program, is at fault; the same as for a wrong option.
 USER_ERROR = 2
-#: The commands in the order of the help, with the module of ``pbrdf.cli`` that has a function of the same name.
+#: The commands in the order of the help, with the module of ``pbrdf.cli``, and where it is not that of the command, the
+#: name of the function in it.
 COMMANDS = {
     "fit": "fit",
     "compare": "compare",
+    "map": "map:map_pixels",
     "simulate": "simulate",
     "calibrate": "calibrate",
     "polarimeter": "polarimeter",
@@ -63,7 +65,8 @@ class _WhenCalled(Mapping[str, Any]):
 
     def __getitem__(self, name: str) -> Any:
         if name not in self._loaded:
-            function = getattr(import_module(f"pbrdf.cli.{COMMANDS[name]}"), name)
+            module, _, function_name = COMMANDS[name].partition(":")
+            function = getattr(import_module(f"pbrdf.cli.{module}"), function_name or name)
             alone = typer.Typer(
                 add_completion=False, rich_markup_mode="markdown", pretty_exceptions_enable=False
             )
@@ -95,10 +98,11 @@ class _Commands(TyperGroup):
     def invoke(self, ctx: Any) -> Any:
         try:
             with _plugin_warnings_in_lines():
+                say_when_interrupted()
                 refuse_odd_numbers(self.commands, given_arguments())
                 return super().invoke(ctx)
         except KeyboardInterrupt:
-            fail("interrupted")
+            fail(what_is_said())
             raise typer.Exit(INTERRUPTED) from None
         except PbrdfError as error:
             fail(str(error))
@@ -199,5 +203,5 @@ def main() -> None:
         except Exception:
             if not heard.is_set():
                 raise
-            fail("interrupted")
+            fail(what_is_said())
             end()

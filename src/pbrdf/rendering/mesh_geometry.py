@@ -180,6 +180,8 @@ def _cast(
     import drjit as dr
     import mitsuba as mi
 
+    if not len(start):
+        return np.zeros(0, dtype=bool), np.zeros((0, 3)), np.zeros((0, 3))
     hits, points, normals = [], [], []
     for first in range(0, len(start), _RAYS):
         part = slice(first, first + _RAYS)

@@ -4,13 +4,13 @@ import math
 
 import numpy as np
 import pytest
-from pixel_helpers import blank, seen, shaded
 
 import pbrdf
 from pbrdf.errors import DataError
 from pbrdf.instruments.goniometer.rays import angles_of
 from pbrdf.instruments.pixel_geometry.camera import Lamp, PixelCamera
 from pbrdf.instruments.pixel_geometry.cylinder import Cylinder
+from pixel_helpers import blank, seen, shaded
 
 LAMPS = [Lamp(1.0, 0.0), Lamp(1.0, math.pi)]
 PERSPECTIVE = PixelCamera(field_of_view=math.radians(30.0))

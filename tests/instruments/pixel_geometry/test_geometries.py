@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 import xarray as xr
-from pixel_helpers import painted
 
 import pbrdf
 from pbrdf.errors import DataError
@@ -15,6 +14,7 @@ from pbrdf.instruments.pixel_geometry.geometries import as_geometries
 from pbrdf.instruments.pixel_geometry.map_dataset import map_dataset
 from pbrdf.instruments.pixel_geometry.panel import Panel
 from pbrdf.instruments.pixel_geometry.sphere import Sphere
+from pixel_helpers import painted
 
 PAINT = pbrdf.DoubleGauss(sigma=0.15, n=1.6, a=0.3, k=1.2, b=0.2, t=0.6)
 LAMPS = [Lamp(math.radians(60.0), 0.5), Lamp(math.radians(85.0), 2.5)]

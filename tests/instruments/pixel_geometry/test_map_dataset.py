@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 import xarray as xr
-from pixel_helpers import blank, painted
 
 import pbrdf
 from pbrdf.data.formats.csv_table.columns import COVARIANCES
@@ -23,6 +22,7 @@ from pbrdf.instruments.polarimeter.polarimeter import rotating_polarizer
 from pbrdf.instruments.reduction.map_files import MapWriter
 from pbrdf.instruments.reduction.reduce import reduce
 from pbrdf.optics.elements import rotate_frame
+from pixel_helpers import blank, painted
 
 PAINT = pbrdf.DoubleGauss(sigma=0.2, n=1.6, a=0.3, k=1.2, b=0.2, t=0.6)
 BALL = Sphere(

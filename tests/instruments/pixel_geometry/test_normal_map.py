@@ -5,12 +5,12 @@ import math
 import numpy as np
 import pytest
 import xarray as xr
-from pixel_helpers import blank
 
 from pbrdf.errors import DataError
 from pbrdf.instruments.pixel_geometry.camera import Lamp, PixelCamera
 from pbrdf.instruments.pixel_geometry.normal_map import AngleMaps, NormalMap
 from pbrdf.instruments.pixel_geometry.sphere import Sphere
+from pixel_helpers import blank
 
 LAMP = Lamp(math.radians(50.0), math.radians(30.0))
 CAMERA = PixelCamera(focal=80.0)

@@ -4,11 +4,11 @@ import math
 
 import numpy as np
 import pytest
-from pixel_helpers import blank
 
 from pbrdf.errors import DataError
 from pbrdf.instruments.pixel_geometry.camera import PixelCamera
 from pbrdf.instruments.pixel_geometry.panel import Panel
+from pixel_helpers import blank
 
 ANGLES = (math.radians(35.0), math.radians(50.0), math.radians(70.0), math.radians(80.0))
 

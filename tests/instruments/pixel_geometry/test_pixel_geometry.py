@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from pixel_helpers import blank
 
 import pbrdf
 from pbrdf.instruments.goniometer.rays import ray_vectors
@@ -12,6 +11,7 @@ from pbrdf.instruments.pixel_geometry.camera import Lamp
 from pbrdf.instruments.pixel_geometry.geometry import plane_rotation
 from pbrdf.instruments.pixel_geometry.sphere import Sphere
 from pbrdf.optics.elements import rotate_frame
+from pixel_helpers import blank
 
 GLASS = pbrdf.DoubleGauss(sigma=0.3, n=1.5, a=0.0, k=1.0, b=0.0, t=0.0)
 MATT = pbrdf.DoubleGauss(sigma=0.05, n=1.5, a=1.0, k=1.0, b=0.0, t=1.0)

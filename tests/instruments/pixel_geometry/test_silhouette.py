@@ -4,13 +4,13 @@ import math
 
 import numpy as np
 import pytest
-from pixel_helpers import blank, shaded
 
 from pbrdf.instruments.pixel_geometry import silhouette
 from pbrdf.instruments.pixel_geometry.camera import Lamp, PixelCamera
 from pbrdf.instruments.pixel_geometry.cylinder import Cylinder
 from pbrdf.instruments.pixel_geometry.silhouette import sample_picture
 from pbrdf.instruments.pixel_geometry.sphere import Sphere
+from pixel_helpers import blank, shaded
 
 LAMPS = [Lamp(1.0, 0.0), Lamp(1.0, math.pi)]
 

@@ -4,13 +4,13 @@ import math
 
 import numpy as np
 import pytest
-from pixel_helpers import blank, seen, shaded
 
 import pbrdf
 from pbrdf.errors import DataError
 from pbrdf.instruments.goniometer.rays import angles_of
 from pbrdf.instruments.pixel_geometry.camera import Lamp, PixelCamera
 from pbrdf.instruments.pixel_geometry.sphere import Sphere
+from pixel_helpers import blank, seen, shaded
 
 SIDE = Lamp(math.radians(50.0), math.radians(30.0))
 TWO = [Lamp(0.8, 1.0), Lamp(0.8, 4.2)]

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pixel_helpers import blank
 
 from pbrdf.errors import DataError
 from pbrdf.instruments.pixel_geometry.camera import Lamp, PixelCamera
@@ -15,6 +14,7 @@ from pbrdf.instruments.pixel_geometry.normal_map import AngleMaps, NormalMap
 from pbrdf.instruments.pixel_geometry.panel import Panel
 from pbrdf.instruments.pixel_geometry.sphere import Sphere
 from pbrdf.instruments.pixel_geometry.text_form import GEOMETRY_KINDS, parse_pixel_geometry
+from pixel_helpers import blank
 
 R = math.radians
 LAMP = Lamp(R(30.0), R(90.0))

@@ -32,7 +32,7 @@ from pbrdf.data.validation import validate
 from pbrdf.errors import DataError
 from pbrdf.files.plain_numbers import json_from_text
 
-__all__ = ["from_stored", "to_stored"]
+__all__ = ["from_stored", "pixels_from_stored", "to_stored"]
 
 _ANGLE_UNITS = {"degree": True, "degrees": True, "deg": True, "rad": False, "radian": False, "radians": False}
 _NANOMETRES = {
@@ -45,6 +45,7 @@ _NANOMETRES = {
     "micrometre": 1e3,
 }
 _JSON = "json:"
+_MASK = "mask"
 
 
 def from_stored(stored: xr.Dataset, path: Path) -> xr.Dataset:
@@ -66,6 +67,38 @@ def from_stored(stored: xr.Dataset, path: Path) -> xr.Dataset:
     DataError
         If a unit is not understood or the content does not follow the schema.
     """
+    ds = _understood(stored, path)
+    validate(ds, origin=str(path))
+    return ds
+
+
+def pixels_from_stored(stored: xr.Dataset, path: Path) -> xr.Dataset:
+    """The same for data with dimensions beside ``geometry``; what the schema says of data sets is not checked.
+
+    Coordinates of those dimensions are kept, and ``mask``, which pixels are the sample.
+
+    Parameters
+    ----------
+    stored
+        Content of the file or a part of it, loaded into memory.
+    path
+        The file, for messages.
+
+    Raises
+    ------
+    DataError
+        If a unit is not understood.
+    """
+    found = _understood(stored, path)
+    own = {
+        name: c for name, c in stored.coords.items() if set(c.dims) <= {name} and name not in found.variables
+    }
+    kept = {name: stored[name] for name in (_MASK,) if name in stored.data_vars}
+    return found.assign_coords(own).assign(kept)
+
+
+def _understood(stored: xr.Dataset, path: Path) -> xr.Dataset:
+    """What the schema knows of a file's content, in its units."""
     known = {*COORDINATES, *VARIABLES, *map(std_name, VARIABLES), COVARIANCE, *STOKES_AXES}
     attrs = {}
     for name, value in plain_attributes(stored.attrs).items():
@@ -93,9 +126,7 @@ def from_stored(stored: xr.Dataset, path: Path) -> xr.Dataset:
             raise
         except (TypeError, ValueError) as error:
             raise DataError(f"{path}: {name} cannot be used as it is stored: {error}") from error
-    ds = xr.Dataset(data, coords, attrs)
-    validate(ds, origin=str(path))
-    return ds
+    return xr.Dataset(data, coords, attrs)
 
 
 def _from_file_units(path: Path, name: str, array: xr.DataArray) -> NDArray[Any]:

@@ -200,8 +200,15 @@ class MapStore:
         """Numbers of the units that are not done, of those that are a worker's share."""
         return [number for number in self.grid.share(worker) if not self.is_done(number)]
 
-    def do(self, number: int) -> None:
+    def do(self, number: int, progress: Callable[[int, int], None] | None = None) -> None:
         """Fit the pixels of a unit and write what was found.
+
+        Parameters
+        ----------
+        number
+            Of the unit.
+        progress
+            Called with the number of its pixels that are fitted and of all.
 
         Raises
         ------
@@ -209,7 +216,7 @@ class MapStore:
             If the store is another one by now, or cannot be written.
         """
         slices = self.grid.slices(number)
-        self.write(number, self.fit.fit_block(self.source.block(slices)))
+        self.write(number, self.fit.fit_block(self.source.block(slices), progress))
 
     def write(self, number: int, result: xr.Dataset) -> None:
         """Write the result of a unit, its mark last."""

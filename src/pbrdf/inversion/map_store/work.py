@@ -35,6 +35,7 @@ def run_units(
     *,
     worker: tuple[int, int] | None = None,
     progress: Callable[[int, int], None] | None = None,
+    within: Callable[[int, int], None] | None = None,
 ) -> Work:
     """Do the units of a map that are missing, in this process, with Dr.Jit's threads.
 
@@ -49,6 +50,8 @@ def run_units(
         (i, N): this is worker i of N, counted from 1. None: this process does all units.
     progress
         Called with the number of finished units and of all, of this worker's share.
+    within
+        Called with the number of fitted pixels of a unit and of all of it, while it is being done.
 
     Raises
     ------
@@ -61,7 +64,7 @@ def run_units(
     if progress is not None:
         progress(found, len(share))
     for number, unit in enumerate(missing, start=1):
-        store.do(unit)
+        store.do(unit, within)
         if progress is not None:
             progress(found + number, len(share))
     return Work(len(missing), found, finish(store))

@@ -207,6 +207,8 @@ class Pixels:
 
     def costs(self, owner: np.ndarray, u: np.ndarray) -> np.ndarray:
         """Cost of lanes without priors, in draft accuracy and single precision; 0 where there is no quick way to it."""
+        if not len(owner):
+            return np.zeros(0)
         problem = residuals(self.space, self.stack, owner, accuracy="draft")
         if isinstance(problem, BlockResiduals):
             return np.zeros(len(owner))

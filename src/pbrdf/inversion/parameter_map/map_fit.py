@@ -343,10 +343,13 @@ max_iterations, share, correlation
             converged=converged,
             passes=passes,
         )
-        values = self._shared_space.to_parameters(theta).tolist()
-        found = {str(label): row for label, row in zip(labels.tolist(), values, strict=True)}
-        settings = {**self.settings, "shared": found}
-        return replace(self, settings=settings, shared=shared)
+        return self.with_shared(shared)
+
+    def with_shared(self, shared: Shared) -> MapFit:
+        """The same with what :meth:`solve_shared` has found before."""
+        values = self._shared_space.to_parameters(shared.unknowns).tolist()
+        found = {str(label): row for label, row in zip(shared.labels.tolist(), values, strict=True)}
+        return replace(self, settings={**self.settings, "shared": found}, shared=shared)
 
     def _first_pass(
         self, blocks: Iterable[xr.Dataset]
@@ -662,7 +665,7 @@ def _form(dataset: xr.Dataset, dims: Sequence[str]) -> xr.Dataset:
             coords[name] = (variable.dims, variable.values)
         elif name in STOKES_AXES:
             coords[name] = (variable.dims, variable.values)
-        elif own or (name in dataset.data_vars and name != MASK and variable.dtype.kind not in "biu"):
+        elif name in dataset.data_vars and (own or (name != MASK and variable.dtype.kind not in "biu")):
             variables[name] = (variable.dims, np.empty([0] * variable.ndim))
     form = xr.Dataset(coords=coords, attrs=dataset.attrs)
     # beside each other, not aligned: the schema is to judge them

@@ -14,6 +14,7 @@ import numpy as np
 
 from pbrdf.instruments.reduction.regions import Region
 from pbrdf.instruments.reduction.stokes_image import BAD_FLAGS
+from pbrdf.report.picture_grid import Margins, beside, picture_grid
 from pbrdf.report.reduction.picture_sums import Picture
 from pbrdf.report.style import styled
 
@@ -73,7 +74,7 @@ def quicklook_figure(picture: Picture, title: str, regions: Mapping[str, Region]
     """
     scales = Scales.of([picture])
     with styled():
-        figure, axes = _grid(1, 3, _PANEL, picture.shape, _MARGINS)
+        figure, axes = picture_grid(1, 3, _PANEL, picture.shape, _MARGINS)
         figure.suptitle(title, y=1.0 - 0.12 / figure.get_figheight(), verticalalignment="top")
         shown = _draw(list(axes[0]), picture, scales)
         titles = (
@@ -94,68 +95,23 @@ def quicklook_figure(picture: Picture, title: str, regions: Mapping[str, Region]
         return figure
 
 
-@dataclass(frozen=True)
-class _Margins:
-    """Space around and between panels, inches."""
-
-    left: float
-    right: float
-    top: float
-    bottom: float
-    across: float
-    down: float
-
-
 #: Width of a panel of a quick look and of a thumbnail, inches, and the space around them.
-_PANEL, _MARGINS = 4.1, _Margins(0.75, 1.05, 0.75, 0.95, 1.6, 0.0)
-_THUMBNAIL, _TIGHT = 1.5, _Margins(0.1, 1.2, 0.95, 0.45, 0.06, 0.14)
+_PANEL, _MARGINS = 4.1, Margins(0.75, 1.05, 0.75, 0.95, 1.6, 0.0)
+_THUMBNAIL, _TIGHT = 1.5, Margins(0.1, 1.2, 0.95, 0.45, 0.06, 0.14)
 #: Thumbnails to a row, and the space for a title above three of them, inches.
 _PER_ROW, _TITLE = 8, 0.32
-
-
-def _grid(
-    rows: int, columns: int, width: float, shape: tuple[int, int], margins: _Margins, groups: int = 1
-) -> tuple[Figure, np.ndarray]:
-    """Axes of the pictures' own proportions, everything in its place in inches; `groups` grids below each other."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    high = width * min(max(shape[0] / shape[1], 0.25), 2.0)
-    m = margins
-    group = rows * high + (rows - 1) * m.down
-    size = (
-        m.left + columns * width + (columns - 1) * m.across + m.right,
-        m.top + groups * group + (groups - 1) * _TITLE + m.bottom,
-    )
-    figure = Figure(figsize=size)
-    FigureCanvasAgg(figure)
-    axes = np.empty((groups * rows, columns), dtype=object)
-    for row in range(groups * rows):
-        above = row // rows * (group + _TITLE) + row % rows * (high + m.down)
-        for column in range(columns):
-            x, y = m.left + column * (width + m.across), size[1] - m.top - above - high
-            box = (x / size[0], y / size[1], width / size[0], high / size[1])
-            axes[row, column] = figure.add_axes(box)
-    return figure, axes
 
 
 def _colour_bar(shown: Any, ax: Axes, label: str, layer: int, scales: Scales) -> None:
     """A bar of colours beside a panel: of intensity (0), DoLP (1) or AoLP (2)."""
     bar = ax.figure.colorbar(
         shown,
-        cax=ax.inset_axes((1.0, 0.0, 0.045, 1.0), transform=_beside(ax)),
+        cax=ax.inset_axes((1.0, 0.0, 0.045, 1.0), transform=beside(ax)),
         label=label,
         extend="max" if layer == 0 or (layer == 1 and scales.dolp < 1.0) else "neither",
     )
     if layer == 2:
         bar.set_ticks(range(-90, 91, 45))
-
-
-def _beside(ax: Axes) -> Any:
-    """The coordinates of the axes, moved right by a tenth of an inch."""
-    from matplotlib.transforms import ScaledTranslation
-
-    return ax.transAxes + ScaledTranslation(0.1, 0.0, ax.figure.dpi_scale_trans)
 
 
 def _legend(figure: Figure, pictures: Sequence[Picture]) -> None:
@@ -248,7 +204,9 @@ def overview_figure(pictures: Sequence[Picture], names: Sequence[str], title: st
     columns = min(count, _PER_ROW)
     scales = Scales.of(pictures)
     with styled():
-        figure, axes = _grid(3, columns, _THUMBNAIL, pictures[0].shape, _TIGHT, math.ceil(count / columns))
+        figure, axes = picture_grid(
+            3, columns, _THUMBNAIL, pictures[0].shape, _TIGHT, math.ceil(count / columns), _TITLE
+        )
         words = f"S0 in digital numbers; DoLP, scale 0 to {scales.dolp:g}; AoLP in degrees, from x towards y"
         figure.suptitle(f"{title}\n{words}", y=1.0 - 0.1 / figure.get_figheight(), verticalalignment="top")
         for k, (picture, name) in enumerate(zip(pictures, names, strict=True)):

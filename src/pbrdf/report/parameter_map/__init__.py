@@ -1,0 +1,1 @@
+"""A map of parameters in pictures, words and a page."""
