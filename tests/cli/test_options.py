@@ -40,7 +40,7 @@ def test_values_of_one_kind_are_named_alike():
 
 
 def test_no_command_imports_another():
-    modules = {f"pbrdf.cli.{module}" for module in COMMAND_MODULES.values()}
+    modules = {f"pbrdf.cli.{module.partition(':')[0]}" for module in COMMAND_MODULES.values()}
     assert len(modules) > 10
     for module in modules:
         tree = ast.parse(Path(sys.modules[module].__file__).read_text(encoding="utf-8"))
