@@ -5,7 +5,8 @@
 ``evaluation``: full Mueller matrices, in double precision with NumPy arrays in and out (``mueller()``), and as a
 renderer has them: directions and matrices stay in the device's memory, double and single precision. ``fit``: the batch
 of ``fit.py``, measured values in the device's memory, parameters and their information matrices back in the host's; in
-double precision throughout, and as the solver does it by itself, where it searches in single precision first.
+double precision throughout, and as the solver does it by itself, where it searches in single precision first; and a map
+of 256 x 256 pixels as a user has it (``pbrdf.fit_map``).
 ``render``: the scene of ``rendering.py``; Mitsuba's variants compute in single precision.
 
 The two take turns; printed are medians and their ratio. They must agree: matrices to 1e-9 of f00 in double and 1e-4 in
@@ -184,7 +185,25 @@ def fit(device: str) -> list[dict[str, Any]]:
             row.compared[place] = row.work[place][1]()[: min(FITS.values())]
         row.scale = np.abs(row.compared["processor"]) + 0.1
         rows.append(row.measure())
+    rows.append(_map(device))
     return rows
+
+
+def _map(device: str) -> dict[str, Any]:
+    """The image of ``maps.py``, from NumPy arrays to the finished map with its standard errors."""
+    from maps import image
+
+    data, _ = image(256)
+    row = Row("fit_map, NumPy arrays in and out", "pixels", 1e-5)
+
+    def call() -> np.ndarray:
+        return np.asarray(pbrdf.fit_map(data)["estimate"].values)
+
+    for place, backend in places(device).items():
+        row.work[place] = (256.0 * 256.0, on(backend, call))
+        row.compared[place] = row.work[place][1]()
+    row.scale = np.abs(row.compared["processor"]) + 0.1
+    return row.measure()
 
 
 def render(device: str) -> list[dict[str, Any]]:

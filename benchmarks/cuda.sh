@@ -65,7 +65,7 @@ done
 export PYTHONPATH="$TREE/src" PYTHONUNBUFFERED=1 DRJIT_CACHE_DIR="$WORK/kernels"
 mkdir "$WORK/kernels"
 status=0
-for piece in machine evaluation:55 fit:60 render:45; do
+for piece in machine evaluation:45 fit:90 render:45; do
   name=${piece%%:*} limit=${piece##*:}
   [ "$limit" = "$name" ] && limit=20
   timeout "$limit" "$RUN" "$HERE/cuda.py" "$name" --device "$DEVICE" --json "$RESULTS/cuda-$name.json"
