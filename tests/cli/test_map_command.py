@@ -455,7 +455,7 @@ def test_units_are_as_large_as_the_memory_holds():
     shape = (42, 1000, 1200)
     one = np.broadcast_to(np.zeros(()), shape)
     dims = ("geometry", "y", "x")
-    outline = xr.Dataset({name: (dims, one) for name in ("I", "Q", "U", "I_std", "Q_std", "U_std")})
+    outline = xr.Dataset(dict.fromkeys(("I", "Q", "U", "I_std", "Q_std", "U_std"), (dims, one)))
     assert _units(outline, ("y", "x"), None, 2 * 10**9).shard == (256, 256)
     small = _units(outline, ("y", "x"), None, 10**8)
     assert 10**8 / 4 < np.prod(small.shard) * 42 * 6 * 32 <= 10**8

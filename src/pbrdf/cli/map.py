@@ -32,8 +32,7 @@ from pbrdf.cli.fit_options import (
 )
 from pbrdf.cli.interrupt import say_when_interrupted
 from pbrdf.cli.options import Backend, output_option, polarimeter_option, quiet_option, seed_option
-from pbrdf.cli.reduce import memory_size
-from pbrdf.cli.values import require_folder_of
+from pbrdf.cli.values import memory_size, require_folder_of
 from pbrdf.errors import PbrdfError
 
 if TYPE_CHECKING:
