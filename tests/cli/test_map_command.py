@@ -438,6 +438,7 @@ def test_the_film_polarisers_as_far_as_one_picture_goes(run, tmp_path, measured)
         (("ball.nc", "-g", "{}", "--labels", "none.toml"), "none.toml"),
         (("ball.nc", "-g", "{}", "-g", "{}"), "2 geometries for 1 files"),
         (("ball.nc", "-g", "{}", "--figure-format", "gif"), "--figure-format 'gif'"),
+        (("ball.nc", "-g", "{}", "--max-memory", "much"), "--max-memory 'much': give a size such as 200MB"),
         (("one.csv", "-g", "flat"), "one.csv"),
     ],
 )
@@ -446,6 +447,19 @@ def test_refusals_are_one_line(refused, tmp_path, ball, arguments, words):
     (tmp_path / "one.csv").write_text("theta_i,theta_r,phi,I\n30,10,0,1\n", encoding="utf-8")
     filled = [word.replace("{}", ball[1]) for word in arguments]
     assert words in refused("map", *filled)
+
+
+def test_units_are_as_large_as_the_memory_holds():
+    from pbrdf.cli.map import _units
+
+    shape = (42, 1000, 1200)
+    one = np.broadcast_to(np.zeros(()), shape)
+    dims = ("geometry", "y", "x")
+    outline = xr.Dataset(dict.fromkeys(("I", "Q", "U", "I_std", "Q_std", "U_std"), (dims, one)))
+    assert _units(outline, ("y", "x"), None, 2 * 10**9).shard == (256, 256)
+    small = _units(outline, ("y", "x"), None, 10**8)
+    assert 10**8 / 4 < np.prod(small.shard) * 42 * 6 * 32 <= 10**8
+    assert _units(outline, ("y", "x"), 1100, 10**6).shard == (1000, 1100)
 
 
 def test_settings_of_a_map_are_json(ball, tmp_path):

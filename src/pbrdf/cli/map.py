@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -31,13 +32,14 @@ from pbrdf.cli.fit_options import (
 )
 from pbrdf.cli.interrupt import say_when_interrupted
 from pbrdf.cli.options import Backend, output_option, polarimeter_option, quiet_option, seed_option
-from pbrdf.cli.values import require_folder_of
+from pbrdf.cli.values import memory_size, require_folder_of
 from pbrdf.errors import PbrdfError
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from pbrdf.inversion.map_store.picture_source import PictureSource
+    from pbrdf.inversion.map_store.unit_grid import UnitGrid
     from pbrdf.inversion.parameter_map import MapFit
     from pbrdf.models import Model
     from pbrdf.report.parameter_map.subject import MapReport
@@ -46,6 +48,8 @@ __all__ = ["map_pixels"]
 
 _MACHINES = "Many machines"
 _FITTING, _SHARING, _QUICK_LOOK = "Fitting", "Finding what pixels share", "quicklook.png"
+#: Memory that a number of the data takes while its unit is fitted, bytes: a measured upper bound.
+_BYTES = 32
 #: Numbers of the data of a map that is fitted in memory, as for a netCDF file, at most.
 _MOST_IN_MEMORY = 200_000_000
 
@@ -154,13 +158,19 @@ def map_pixels(
     unit: Annotated[
         int | None,
         typer.Option(
-            help="Pixels along the side of a unit: what a kill costs, and what memory holds at a time.",
+            help="Pixels along the side of a unit: what a kill costs, and what is in memory at a time.",
             min=8,
             metavar="PIXELS",
-            show_default="256, less for small maps",
+            show_default="256, or what --max-memory holds",
             rich_help_panel=_MACHINES,
         ),
     ] = None,
+    max_memory: Annotated[
+        str,
+        typer.Option(
+            help="About so much memory for a unit and its data.", metavar="SIZE", rich_help_panel=_MACHINES
+        ),
+    ] = "2GB",
 ) -> None:
     """Fit a model to every pixel: maps of its parameters with their standard errors.
 
@@ -181,6 +191,7 @@ def map_pixels(
     from pbrdf.report.fit.folder import parse_formats
 
     formats = parse_formats(figure_format, "--figure-format")
+    memory = memory_size(max_memory, "--max-memory")
     target = output or Path(f"{stokes[0].resolve().stem}-map.zarr")
     place = _worker(worker)
     _check_output(target, place, scheduler)
@@ -227,7 +238,7 @@ def map_pixels(
         found = _fit_in_memory(source, chosen, target, {"labels": named, **arguments}, quiet)
     else:
         picture = report / _QUICK_LOOK if figures else None
-        if not _fill(target, fit, source, place, scheduler, unit, picture, quiet):
+        if not _fill(target, fit, source, place, scheduler, (unit, memory), picture, quiet):
             if quiet:
                 print(target)
             return
@@ -284,11 +295,14 @@ def _reduced(
     from pbrdf.report.reduction.folder import Wanted, write_reduction
 
     instrument = open_instrument(polarimeter)
+    names = [path.resolve().stem for path in frames]
+    for name in names:
+        if names.count(name) > 1:
+            raise PbrdfError(f"two of the frames are called {name!r}: reduce them first, one after the other")
     table = None if angles is None else read_angles(angles)
     given = [Path(polarimeter), *([] if angles is None else [angles])]
     found = []
-    for path in frames:
-        name = path.resolve().stem
+    for path, name in zip(frames, names, strict=True):
         folder = target.with_name(f"{target.stem}-reduced") / name
         pictures = folder / f"stokes{target.suffix}"
         found.append(pictures)
@@ -345,22 +359,24 @@ def _fill(
     source: PictureSource,
     place: tuple[int, int] | None,
     scheduler: str | None,
-    unit: int | None,
+    asked: tuple[int | None, int],
     picture: Path | None,
     quiet: bool,
 ) -> bool:
-    """Fit what is missing in the store of a map; returns whether it is complete."""
+    """Fit what is missing in the store of a map; returns whether it is complete.
+
+    Units have the side asked for, or as many pixels as the memory asked for holds.
+    """
     from pbrdf.inversion.map_store import prepare_store, run_on_scheduler, run_units
     from pbrdf.inversion.map_store.shared_file import with_shared
     from pbrdf.report.parameter_map.quicklook import QuickLook
 
+    grid = _units(source.outline(), fit.dims, *asked)
     if fit.settings["share"]:
         kept = target.with_name(f"{target.stem}-shared.npz")
         with stage_bar(quiet, _SHARING) as show:
-            fit = with_shared(fit, source, kept, progress=functools.partial(show, f"{_SHARING}, units"))
-    sizes = fit.template()["status"].sizes
-    side = None if unit is None else {dim: min(unit, sizes[dim]) for dim in fit.dims}
-    store = prepare_store(target, fit, source, shard=side)
+            fit = with_shared(fit, source, grid, kept, progress=functools.partial(show, f"{_SHARING}, units"))
+    store = prepare_store(target, fit, source, shard=dict(zip(grid.dims, grid.shard, strict=True)))
     look = None if picture is None else QuickLook(store, picture)
     state = [0, store.grid.count]
     say_when_interrupted(
@@ -389,6 +405,21 @@ def _fill(
             f"{target}: {work.left} units are left to other workers; the one that ends last draws the figures"
         )
     return not work.left
+
+
+def _units(outline: xr.Dataset, dims: Sequence[str], side: int | None, memory: int) -> UnitGrid:
+    """How a map is cut where there is no store yet."""
+    from pbrdf.inversion.map_store.unit_grid import UNIT, UnitGrid
+
+    sizes = {dim: outline.sizes[dim] for dim in dims}
+    if side is not None:
+        return UnitGrid.of(sizes, {dim: min(side, size) for dim, size in sizes.items()})
+    numbers = sum(
+        math.prod(size for dim, size in variable.sizes.items() if dim not in sizes)
+        for variable in outline.variables.values()
+        if set(dims) & set(map(str, variable.dims))
+    )
+    return UnitGrid.of(sizes, pixels=max(min(memory // (_BYTES * numbers), UNIT), 1))
 
 
 def _report(subject: MapReport, folder: Path, formats: Sequence[str], figures: bool, quiet: bool) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -20,7 +19,7 @@ from pbrdf.cli.options import (
     roi_option,
 )
 from pbrdf.cli.regions import open_regions
-from pbrdf.cli.values import number
+from pbrdf.cli.values import memory_size
 from pbrdf.errors import PbrdfError
 
 if TYPE_CHECKING:
@@ -31,9 +30,6 @@ __all__ = ["reduce"]
 
 #: Extensions of tables of readings.
 _TABLES = (".csv", ".tsv", ".txt", ".dat")
-_UNITS = {"": 1, "K": 10**3, "M": 10**6, "G": 10**9, "T": 10**12}
-#: Less memory than this holds no block of a large picture.
-_LEAST_MEMORY = 1_000_000
 
 
 def reduce(
@@ -306,14 +302,3 @@ def _reduce_pictures(
     print_averages(result.averages, series.names, console)
     files = ", ".join(file.name for file in result.files)
     console.print(f"\nWritten to {result.files[0].parent}/: {files}", markup=False)
-
-
-def memory_size(text: str, option: str) -> int:
-    """Bytes from a text such as 200MB; raises PbrdfError if it is none or too little."""
-    match = re.fullmatch(r"([\d.]+)\s*([KMGT]?)B?", text.strip().upper())
-    if match is None:
-        raise PbrdfError(f"{option} {text!r}: give a size such as 200MB or 2GB")
-    size = int(number(match[1], option) * _UNITS[match[2]])
-    if size < _LEAST_MEMORY:
-        raise PbrdfError(f"{option} {text!r}: at least 1MB is needed")
-    return size

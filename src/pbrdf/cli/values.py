@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from pbrdf.files.plain_numbers import number_from_text
 __all__ = [
     "angles",
     "bounds",
+    "memory_size",
     "number",
     "numbers",
     "pairs",
@@ -24,6 +26,9 @@ __all__ = [
 
 #: More values than this in one list are a slip of the pen.
 _MOST_VALUES = 100_000
+_UNITS = {"": 1, "K": 10**3, "M": 10**6, "G": 10**9, "T": 10**12}
+#: Less memory than this holds no block of a large picture.
+_LEAST_MEMORY = 1_000_000
 
 
 def number(text: str, option: str) -> float:
@@ -159,6 +164,17 @@ def angles(text: str, option: str) -> list[float]:
         # Twelve digits hide the rounding of the steps: 0.3, not 0.30000000000000004.
         values += [round(start + i * step, 12) for i in range(count)]
     return values
+
+
+def memory_size(text: str, option: str) -> int:
+    """Bytes from a text such as 200MB; raises PbrdfError if it is none or too little."""
+    match = re.fullmatch(r"([\d.]+)\s*([KMGT]?)B?", text.strip().upper())
+    if match is None:
+        raise PbrdfError(f"{option} {text!r}: give a size such as 200MB or 2GB")
+    size = int(number(match[1], option) * _UNITS[match[2]])
+    if size < _LEAST_MEMORY:
+        raise PbrdfError(f"{option} {text!r}: at least 1MB is needed")
+    return size
 
 
 def stokes_vector(text: str, option: str) -> tuple[float, float, float, float]:

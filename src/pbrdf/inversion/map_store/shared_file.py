@@ -30,6 +30,7 @@ _DIGEST = "digest"
 def with_shared(
     fit: MapFit,
     source: MapSource,
+    grid: UnitGrid,
     path: Path,
     *,
     progress: Callable[[int, int], None] | None = None,
@@ -42,6 +43,8 @@ def with_shared(
         The settings.
     source
         The pixels.
+    grid
+        The units in which they are gone through.
     path
         The file; written where it is not there.
     progress
@@ -59,8 +62,6 @@ def with_shared(
     digest = digest_of({"fit": fit.settings, "input": source.identity()})
     found = _kept(path, digest)
     if found is None:
-        sizes = fit.template()["status"].sizes
-        grid = UnitGrid.of({dim: sizes[dim] for dim in fit.dims})
         solved = fit.solve_shared(_Units(source, grid, progress))
         assert solved.shared is not None
         found = solved.shared

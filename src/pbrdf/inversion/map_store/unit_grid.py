@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 from pbrdf.errors import PbrdfError
 
-__all__ = ["UnitGrid"]
+__all__ = ["UNIT", "UnitGrid"]
 
 #: Pixels of a unit: some seconds to a minute of fitting, which is what a kill costs; a few files.
-_UNIT = 2**16
+UNIT = 2**16
 #: Pixels of a chunk, the least that is read at a time.
 _CHUNK = 2**12
 
@@ -41,6 +41,8 @@ class UnitGrid:
         sizes: Mapping[str, int],
         shard: Mapping[str, int] | None = None,
         chunk: Mapping[str, int] | None = None,
+        *,
+        pixels: int = UNIT,
     ) -> UnitGrid:
         """Cut a map.
 
@@ -49,8 +51,10 @@ class UnitGrid:
         sizes
             Pixels along each dimension.
         shard, chunk
-            Pixels of a unit and of a chunk; what is not given is chosen: units of about 65536 pixels, as square as
-            can be in the last dimensions, of 16 chunks.
+            Pixels of a unit and of a chunk; what is not given is chosen: units as square as can be in the last
+            dimensions, of 16 chunks.
+        pixels
+            Of a unit whose lengths are chosen, at most.
 
         Raises
         ------
@@ -63,7 +67,7 @@ class UnitGrid:
                     raise PbrdfError(f"units: the map has no dimension {dim!r}, but {', '.join(sizes)}")
                 if length < 1:
                     raise PbrdfError(f"units: {length} pixels along {dim}")
-        units = _lengths(sizes, _UNIT, shard or {})
+        units = _lengths(sizes, pixels, shard or {})
         chunks = tuple(
             length if dim in (chunk or {}) else _divisor(unit, length)
             for dim, unit, length in zip(
