@@ -19,7 +19,7 @@ from pbrdf.inversion.solver import Residuals, linearise
 from pbrdf.models.base import Model
 from pbrdf.models.parameters import Parameter
 
-__all__ = ["Space", "Term", "derivatives", "predict", "residuals"]
+__all__ = ["Space", "Term", "derivatives", "predict", "residuals", "signals_of"]
 
 #: What an even parameter is at least where derivatives are taken, which at 0 would be 0/0: far below what matters.
 _POINT = 1e-6
@@ -352,6 +352,11 @@ def _at_points(space: Space, unknowns: np.ndarray, data: Observations) -> tuple[
         return np.broadcast_to(unknowns[:, None], (len(unknowns), size, unknowns.shape[1])), np.zeros(size)
     place = space.blocks.places(getattr(data, space.blocks.split))
     return space.blocks.at(unknowns, place), place
+
+
+def signals_of(space: Space, data: Sequence[Observations], accuracy: str | None = None) -> Any:
+    """``f(u, number, point, channels)``: channels modelled at a point of a data set, for residuals of one's own."""
+    return _Signals(space, data, accuracy, get_backend().Float)
 
 
 class _Signals:
