@@ -16,7 +16,6 @@ a linear model it follows χ² with as many degrees of freedom as there are meas
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -29,7 +28,7 @@ from pbrdf.errors import FitError
 from pbrdf.identification.material import Material
 from pbrdf.inversion.nuisance import KINDS
 from pbrdf.inversion.observations import Observations
-from pbrdf.inversion.problem import Space, Term, predict, signals_of
+from pbrdf.inversion.problem import Term, predict, signals_of
 from pbrdf.inversion.solver import Residuals, solve
 
 __all__ = ["Evidence", "evidence"]
