@@ -10,8 +10,8 @@ numbers z; the posterior of z has the density exp(−c(z)) with
 Its maximum ẑ is found by the batched solver, a lane for each material of each measurement, and the integral over z is
 Laplace's approximation, log p = −c(ẑ) − ½ log det H, with H = JᵀJ + 1 at ẑ (MacKay, *Information Theory, Inference, and
 Learning Algorithms* (2003), ch. 27-28). It is exact where the model is linear over the posterior; constants that all
-materials share are left out. 2 c(ẑ) is the squared Mahalanobis distance from the material's predictive distribution: for
-a linear model it follows χ² with as many degrees of freedom as there are measured values, less one for a gain.
+materials share are left out. 2 c(ẑ) is the squared Mahalanobis distance from the material's predictive distribution:
+for a linear model it follows χ² with as many degrees of freedom as there are measured values, less one for a gain.
 """
 
 from __future__ import annotations

@@ -109,7 +109,7 @@ class Identification:
 
 
 def unknown_gain(dataset: xr.Dataset) -> bool:
-    """Whether intensities of a data set have a factor that is not known: an arbitrary scale, or radiances and counts."""
+    """Whether intensities have a factor that is not known: their scale is arbitrary, or they are radiances or counts."""
     quantity = dataset.attrs["quantity"]
     if quantity == NORMALISED:
         return False

@@ -1,8 +1,8 @@
 """A material: how its specimens are distributed.
 
-The parameters of a model of a paint differ from panel to panel, by more than one measurement is uncertain. A material is
-a normal distribution of the solver's unknowns (the logarithm of a logarithmic parameter, the square of an even one, else
-the parameter) over specimens. Its covariance is the sample's, shrunk (:mod:`pbrdf.identification.shrinkage`), less the
+The parameters of a model of a paint differ from panel to panel, by more than one measurement is uncertain. A material
+is a normal distribution of the solver's unknowns (the logarithm of a logarithmic parameter, the square of an even one,
+else the parameter) over specimens. Its covariance is the sample's, shrunk (:mod:`pbrdf.identification.shrinkage`), less the
 mean covariance of the specimens' own fits, which scatter on their own account. The mean of few specimens is uncertain
 itself: a new one scatters about it with (1 + 1/S) times that covariance.
 """
@@ -174,10 +174,10 @@ def material_from_model(
         raise FitError(f"material {name}: the model holds arrays; give one with single numbers")
     values = {key: float(value) for key, value in model.values.items()}
     free = tuple(p for p in model.parameters if p.fitted)
-    space = _space(
-        type(model), model.chosen, free, {k: v for k, v in values.items() if k not in {p.name for p in free}}
-    )
-    mean = space.to_unknowns(np.array([values[p.name] for p in free]))
+    fixed = {key: value for key, value in values.items() if key not in {p.name for p in free}}
+    own = np.array([values[p.name] for p in free])
+    space = _space(type(model), model.chosen, free, fixed, own)
+    mean = space.to_unknowns(own)
     spread = assumed_scatter(free, scatter)
     return Material(
         name, space, mean, np.diag(spread**2), 0, "assumed", simulated, wavelength, tuple(provenance)

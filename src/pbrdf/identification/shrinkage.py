@@ -1,7 +1,7 @@
 """Covariance of specimens from few of them: the sample's own, shrunk towards a multiple of the identity.
 
-Ledoit and Wolf, J. Multivariate Anal. 88, 365 (2004): the share of the identity that makes the expected squared error of
-the matrix small, estimated from the sample itself.
+Ledoit and Wolf, J. Multivariate Anal. 88, 365 (2004): the share of the identity that makes the expected squared error
+of the matrix small, estimated from the sample itself.
 """
 
 from __future__ import annotations
