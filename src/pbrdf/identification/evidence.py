@@ -29,9 +29,9 @@ from pbrdf.identification.material import Material
 from pbrdf.inversion.nuisance import KINDS
 from pbrdf.inversion.observations import Observations
 from pbrdf.inversion.problem import Term, predict, signals_of
-from pbrdf.inversion.solver import Residuals, solve
+from pbrdf.inversion.solver import Residuals, Solution, solve
 
-__all__ = ["Evidence", "evidence"]
+__all__ = ["Evidence", "evidence", "posterior"]
 
 #: A gain that is not known is log-normal about the best one, with so many e-folds: a factor of 20 either way.
 GAIN_SPREAD = 3.0
@@ -97,15 +97,42 @@ def evidence(
     values: list[Any] = [None] * count
     gain = gain and not all(is_ratio(channel) for channel in data[0].channels)
     factors = _best_gains(materials, data) if gain else None
+    centre = None if factors is None else factors.mean(axis=1)
     for members in _alike(materials):
         group = [materials[i] for i in members]
-        start_gain = None if factors is None else factors[:, members]
-        found = _of_one_model(group, data, start_gain, factors, angle, accuracy, max_iterations)
-        log_evidence[:, members], distance[:, members] = found[0], found[1]
+        start = None if factors is None else factors[:, members]
+        solution = _of_one_model(group, data, start, centre, angle, accuracy, max_iterations)
+        size, shape = len(group[0].mean), (batch, len(group))
+        cost = solution.cost.reshape(shape)
+        logdet = np.linalg.slogdet(solution.information)[1].reshape(shape)
+        log_evidence[:, members] = -cost - 0.5 * logdet
+        # the prior of the gain is none of the data's
+        of_gain = 0.0 if factors is None else solution.u[:, size].reshape(shape) ** 2
+        distance[:, members] = 2.0 * cost - of_gain
+        z = solution.u[:, :size].reshape(*shape, size)
         for place, member in enumerate(members):
-            values[member] = found[2][:, place]
+            own = materials[member]
+            unknowns = np.clip(own.mean + z[:, place] @ own.root.T, *own.space.box)
+            values[member] = own.space.to_parameters(unknowns)
     measured = np.array([int(np.isfinite(o.std).sum()) for o in data])
     return Evidence(log_evidence, distance, measured - int(gain), tuple(values))
+
+
+def posterior(
+    material: Material, data: Sequence[Observations], *, gain: bool = False, accuracy: str | None = None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
+    """Mode and information of z for one material, and the logarithm of the gain about which z counts it.
+
+    Returns
+    -------
+    z, information, centre
+        Shapes (B, Z), (B, Z, Z) and (B,), None where the gain is known. z holds the specimen's numbers and then the
+        gain's: ln g = centre + ``GAIN_SPREAD`` z.
+    """
+    factors = _best_gains([material], data) if gain else None
+    centre = None if factors is None else factors.mean(axis=1)
+    solution = _of_one_model([material], data, factors, centre, None, accuracy, 50)
+    return solution.u, solution.information, centre
 
 
 def _alike(materials: Sequence[Material]) -> list[list[int]]:
@@ -117,7 +144,7 @@ def _alike(materials: Sequence[Material]) -> list[list[int]]:
 
 
 def _best_gains(materials: Sequence[Material], data: Sequence[Observations]) -> np.ndarray:
-    """Gain at which the mean of each material fits the intensities best, shape (B, C)."""
+    """Logarithm of the gain at which the mean of each material fits the intensities best, shape (B, C)."""
     first = data[0]
     rows = [c for c, name in enumerate(first.channels) if not is_ratio(name)]
     names = [first.channels[c] for c in rows]
@@ -136,18 +163,19 @@ def _best_gains(materials: Sequence[Material], data: Sequence[Observations]) -> 
             weights = 1.0 / one.std[rows] ** 2
             along = (weights * modelled * one.values[rows]).sum()
             gains[b, c] = max(along / (weights * modelled**2).sum(), 1e-12)
-    return gains
+    return np.log(gains)
 
 
 def _of_one_model(
     materials: Sequence[Material],
     data: Sequence[Observations],
     start_gain: np.ndarray | None,
-    all_gains: np.ndarray | None,
+    centre_gain: np.ndarray | None,
     angle: float | None,
     accuracy: str | None,
     max_iterations: int,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+) -> Solution:
+    """Posterior modes, lane b C + c for material c and measurement b; unknowns z of the specimen, gain, angle."""
     import drjit as dr
 
     backend = get_backend()
@@ -169,7 +197,7 @@ def _of_one_model(
     points = first.values.shape[1]
     measured = [backend.upload(Float, np.concatenate([o.values[c] for o in data])) for c in channels]
     weights = [backend.upload(Float, np.concatenate([o.weights[c] for o in data])) for c in channels]
-    low, high = (np.array(b) for b in materials[0].space.box)
+    low, high = materials[0].space.box
     means = [backend.upload(Float, np.array([m.mean[i] for m in materials])) for i in range(size)]
     roots = {
         (i, j): backend.upload(Float, np.array([m.root[i, j] for m in materials]))
@@ -179,8 +207,7 @@ def _of_one_model(
     bounds = [(dr.opaque(Float, a), dr.opaque(Float, b)) for a, b in zip(low, high, strict=True)]
     centre = None
     if start_gain is not None:
-        assert all_gains is not None
-        centre = backend.upload(Float, np.log(all_gains).mean(axis=1))
+        centre = backend.upload(Float, centre_gain)
     spread_angle = None if angle is None else dr.opaque(Float, angle)
     stride, kinds = dr.opaque(UInt32, points), dr.opaque(UInt32, count)
 
@@ -212,25 +239,11 @@ def _of_one_model(
     unknowns = size + len(nuisances)
     start = np.zeros((batch * count, unknowns))
     if start_gain is not None:
-        assert all_gains is not None
-        offset = np.log(start_gain) - np.log(all_gains).mean(axis=1, keepdims=True)
-        start[:, size] = (offset / GAIN_SPREAD).ravel()
+        assert centre_gain is not None
+        start[:, size] = ((start_gain - centre_gain[:, None]) / GAIN_SPREAD).ravel()
     problem = Residuals(function, points, penalty)
     limit = np.full(unknowns, REACH)
     solution = solve(problem, start, -limit, limit, max_iterations=max_iterations, tolerance=1e-6)
     if not np.isfinite(solution.cost).all():
         raise FitError("the likelihood of a material is not finite: check the data's values and the library")
-    logdet = np.linalg.slogdet(solution.information)[1]
-    shape = (batch, count)
-    z = solution.u[:, :size].reshape(batch, count, size)
-    specimen = np.stack(
-        [
-            m.space.to_parameters(np.clip(m.mean + z[:, c] @ m.root.T, low, high))
-            for c, m in enumerate(materials)
-        ],
-        axis=1,
-    )
-    cost = solution.cost.reshape(shape)
-    if start_gain is not None:  # the prior of the gain is none of the data's
-        cost = cost - 0.5 * solution.u[:, size].reshape(shape) ** 2
-    return -solution.cost.reshape(shape) - 0.5 * logdet.reshape(shape), 2.0 * cost, specimen
+    return solution

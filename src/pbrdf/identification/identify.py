@@ -109,7 +109,7 @@ class Identification:
 
 
 def unknown_gain(dataset: xr.Dataset) -> bool:
-    """Whether intensities have a factor that is not known: their scale is arbitrary, or they are radiances or counts."""
+    """Whether a factor of the intensities is not known: their scale is arbitrary, or they are radiances or counts."""
     quantity = dataset.attrs["quantity"]
     if quantity == NORMALISED:
         return False

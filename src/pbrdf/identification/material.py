@@ -2,9 +2,9 @@
 
 The parameters of a model of a paint differ from panel to panel, by more than one measurement is uncertain. A material
 is a normal distribution of the solver's unknowns (the logarithm of a logarithmic parameter, the square of an even one,
-else the parameter) over specimens. Its covariance is the sample's, shrunk (:mod:`pbrdf.identification.shrinkage`), less the
-mean covariance of the specimens' own fits, which scatter on their own account. The mean of few specimens is uncertain
-itself: a new one scatters about it with (1 + 1/S) times that covariance.
+else the parameter) over specimens. Its covariance is the sample's, shrunk (:mod:`pbrdf.identification.shrinkage`), less
+the mean covariance of the specimens' own fits, which scatter on their own account. The mean of few specimens is
+uncertain itself: a new one scatters about it with (1 + 1/S) times that covariance.
 """
 
 from __future__ import annotations
