@@ -3,8 +3,9 @@
 The parameters of a model of a paint differ from panel to panel, by more than one measurement is uncertain. A material
 is a normal distribution of the solver's unknowns (the logarithm of a logarithmic parameter, the square of an even one,
 else the parameter) over specimens. Its covariance is the sample's, shrunk (:mod:`pbrdf.identification.shrinkage`), less
-the mean covariance of the specimens' own fits, which scatter on their own account. The mean of few specimens is
-uncertain itself: a new one scatters about it with (1 + 1/S) times that covariance.
+the mean covariance of the specimens' own fits, which scatter on their own account, and averaged with an assumed scatter
+that counts as much as two differences between specimens. The mean of few specimens is uncertain itself: a new one
+scatters about it with (1 + 1/S) times that covariance.
 """
 
 from __future__ import annotations
@@ -30,8 +31,8 @@ __all__ = ["Material", "assumed_scatter", "material_from_fits", "material_from_m
 
 #: Scatter between specimens where it is only assumed: of a logarithm, and as a part of a parameter's default bounds.
 ASSUMED_LOGARITHM, ASSUMED_PART = 0.1, 0.02
-#: No direction scatters by less than this part of the assumed scatter, however well the specimens agree.
-LEAST_SCATTER = 0.1
+#: The assumed scatter counts as much as so many differences between specimens.
+BELIEF = 2.0
 #: Factor by which the amplitude of a specimen may differ from the mean.
 _AMPLITUDES = 1e3
 
@@ -280,9 +281,11 @@ def pooled(
         scaled, source = np.eye(len(unit)) + own, "assumed"
     else:
         shrunk, _ = ledoit_wolf(estimates / unit)
-        scatter = shrunk * (count / (count - 1.0)) - own
-        eigenvalues, vectors = np.linalg.eigh(0.5 * (scatter + scatter.T))
-        scatter = (vectors * np.maximum(eigenvalues, LEAST_SCATTER**2)) @ vectors.T
+        found = shrunk * (count / (count - 1.0)) - own
+        eigenvalues, vectors = np.linalg.eigh(0.5 * (found + found.T))
+        found = (vectors * np.maximum(eigenvalues, 0.0)) @ vectors.T
+        # a few specimens that happen to agree do not show that all do
+        scatter = ((count - 1.0) * found + BELIEF * np.eye(len(unit))) / (count - 1.0 + BELIEF)
         scaled, source = scatter + (scatter + own) / count, "estimated"
     return mean, scaled * np.outer(unit, unit), source
 
