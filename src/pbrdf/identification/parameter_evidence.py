@@ -1,8 +1,8 @@
 """How well materials explain fitted parameters: a pixel of a map, or a fit whose data are not at hand.
 
 Estimates u with covariance C of a specimen drawn from N(μ, Σ) are distributed as N(μ, Σ + C): the integrated likelihood
-and the distance (u − μ)ᵀ (Σ + C)⁻¹ (u − μ) are closed forms. Parameters that the data do not determine come with a large
-variance and say nothing. Bounds are not looked at: a parameter on a bound counts as not determined.
+and the distance (u − μ)ᵀ (Σ + C)⁻¹ (u − μ) are closed forms. Parameters that the data do not determine come with a
+large variance and say nothing. Bounds are not looked at: a parameter on a bound counts as not determined.
 """
 
 from __future__ import annotations
