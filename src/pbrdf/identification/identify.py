@@ -21,7 +21,15 @@ from pbrdf.inversion.observations import Observations
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Candidate", "Identification", "calibrate_library", "identify", "unknown_gain"]
+__all__ = [
+    "Candidate",
+    "Identification",
+    "calibrate_library",
+    "check_request",
+    "identify",
+    "shares",
+    "unknown_gain",
+]
 
 #: Standard deviation of an unknown offset of the sample's angle, radians (docs/fitting.md, nuisance terms).
 ANGLE_OFFSET = math.radians(0.2)
@@ -157,7 +165,7 @@ def identify(
         If the library is empty, an option is none, or the data are not valid.
     """
     validate(dataset)
-    _check(library, confidence)
+    check_request(library, confidence)
     if isinstance(noise, str):
         noise = parse_noise(noise)
     observed = Observations.from_dataset(dataset, noise)
@@ -170,7 +178,7 @@ def identify(
     if used is not None:
         words = used.measurements or "labelled measurements"
     return Identification(
-        candidates=_candidates(found, library, confidence, _shares(library, prior), used),
+        candidates=_candidates(found, library, confidence, shares(library, prior), used),
         confidence=confidence,
         degrees_of_freedom=int(found.degrees_of_freedom[0]),
         gain=gain,
@@ -226,15 +234,16 @@ def calibrate_library(
     return Library(library.materials, calibration)
 
 
-def _check(library: Library, confidence: float) -> None:
+def check_request(library: Library, confidence: float) -> None:
+    """Raise FitError if the library is empty or the confidence is none."""
     if not library.materials:
         raise FitError("the library has no material: add one first (`pbrdf library add NAME FIT`)")
     if not 0.0 < confidence < 1.0:
         raise FitError(f"confidence={confidence:g}: give a number between 0 and 1, like 0.95")
 
 
-def _shares(library: Library, prior: Mapping[str, float] | None) -> np.ndarray:
-    """Prior probabilities, shape (C,)."""
+def shares(library: Library, prior: Mapping[str, float] | None) -> np.ndarray:
+    """Prior probabilities from those stated by name, shape (C,); raises FitError where they are none."""
     count = len(library.materials)
     if not prior:
         return np.full(count, 1.0 / count)
