@@ -20,6 +20,7 @@ import numpy as np
 
 from pbrdf.data.schema import is_ratio
 from pbrdf.inversion.holdout import DARK
+from pbrdf.inversion.statistics import typical
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -74,7 +75,7 @@ class PointErrors:
         measured, modelled = column("I_measured"), column("I_modelled")
         floor = 0.0
         if "I_measured" in comparison:
-            floor = DARK * float(np.nanmedian(np.abs(comparison["I_measured"].values)))
+            floor = DARK * typical(comparison["I_measured"].values)
         floor = max(floor, float(np.finfo(float).tiny))
         with np.errstate(divide="ignore", invalid="ignore"):
             intensity = _penalised((modelled - measured) / np.maximum(measured, floor), measured)

@@ -10,6 +10,7 @@ import numpy as np
 
 from pbrdf.errors import FitError
 from pbrdf.files.plain_numbers import number_from_text
+from pbrdf.inversion.statistics import typical
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -150,7 +151,7 @@ def prediction_errors(comparison: xr.Dataset, where: np.ndarray) -> Prediction:
         measured = comparison[f"{channel}_measured"].values[where]
         error = comparison[f"{channel}_modelled"].values[where] - measured
         if relative:
-            dark = DARK * float(np.nanmedian(np.abs(comparison[f"{channel}_measured"].values)))
+            dark = DARK * typical(comparison[f"{channel}_measured"].values)
             error = error / np.maximum(measured, max(dark, np.finfo(float).tiny))
         return error[np.isfinite(error)]
 

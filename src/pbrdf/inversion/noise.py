@@ -47,8 +47,9 @@ class NoiseModel:
 
     For a Stokes component (or a Mueller element) the variance is (relative·I)² + (absolute·I_median)², with
     I the intensity of the same geometry (of unpolarised light for a Mueller matrix) and I_median the median
-    intensity of the data set; for a ratio, such as the degree of linear polarisation, it is relative² +
-    (absolute·I_median/I)², with I_median for I where no intensity was measured.
+    intensity of the data set (of those above 0 where most are 0, which would otherwise weigh without end); for a
+    ratio, such as the degree of linear polarisation, it is relative² + (absolute·I_median/I)², with I_median for I
+    where no intensity was measured.
     The relative part lets a specular peak a thousand times brighter than the diffuse floor weigh no more than
     the floor, and the absolute part keeps readings in the dark, where real data are noise and stray light, from
     weighing too much. The default, 5 % each, predicted the held-out incidence of a measured enamel best among
@@ -188,14 +189,27 @@ class EqualNoise:
 
 
 def _median(values: np.ndarray) -> np.ndarray:
-    """Median of what is finite along the last axis, which is kept; 1 where nothing is."""
+    """Median of what is finite along the last axis, which is kept; 1 where nothing is.
+
+    Of what is above 0 where the median is 0, see :func:`pbrdf.inversion.statistics.typical`.
+    """
     known = np.isfinite(values)
-    count = known.sum(axis=-1, keepdims=True)
-    ordered = np.sort(np.where(known, values, np.inf), axis=-1)
+    median = _middle(np.where(known, values, np.inf), known)
+    lit = known & (values > 0.0)
+    black = (median == 0.0) & lit.any(axis=-1, keepdims=True)
+    if black.any():
+        median = np.where(black, _middle(np.where(lit, values, np.inf), lit), median)
+    return np.where(known.any(axis=-1, keepdims=True), median, 1.0)
+
+
+def _middle(values: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+    """Median along the last axis of the chosen values, those not chosen being infinite."""
+    count = chosen.sum(axis=-1, keepdims=True)
+    ordered = np.sort(values, axis=-1)
     low, high = (
         np.take_along_axis(ordered, np.maximum(place, 0), axis=-1) for place in ((count - 1) // 2, count // 2)
     )
-    return np.where(count > 0, 0.5 * low + 0.5 * high, 1.0)
+    return 0.5 * low + 0.5 * high
 
 
 def parse_noise(text: str) -> Noise:

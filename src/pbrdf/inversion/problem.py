@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any
@@ -20,7 +20,7 @@ from pbrdf.inversion.stack import Stack
 from pbrdf.models.base import Model
 from pbrdf.models.parameters import Parameter
 
-__all__ = ["Space", "Term", "derivatives", "predict", "residuals"]
+__all__ = ["Space", "Term", "derivatives", "misfits", "predict", "residuals", "signals_of"]
 
 #: What an even parameter is at least where derivatives are taken, which at 0 would be 0/0: far below what matters.
 _POINT = 1e-6
@@ -208,16 +208,8 @@ def residuals(
     stack = data if isinstance(data, Stack) else Stack.of(data)
     backend = get_backend()
     Float, UInt32 = backend.Float32 if single else backend.Float, backend.UInt32
-    points, channels = stack.points, stack.channels
-    signals = _Signals(space.of_a_block, stack, accuracy, Float)
-    measured = stack.upload("values", Float)
-    stride = dr.opaque(UInt32, len(stack))
-    factors: dict[tuple[int, int], Any] | None = None
-    weights: list[Any] = []
-    if stack.whitening is not None:
-        factors = dict(zip(stack.whitening, stack.upload("whitening", Float), strict=True))
-    else:
-        weights = stack.upload("weights", Float)
+    points = stack.points
+    misfit = misfits(space.of_a_block, stack, accuracy, Float)
     divisor = owner = None
     if isinstance(starts, int):
         divisor = dr.opaque(UInt32, starts)
@@ -225,23 +217,7 @@ def residuals(
         owner = backend.upload(UInt32, starts)
 
     def function(u: list[Any], lane: Any, point: Any) -> tuple[list[Any], Any]:
-        number = lane // divisor if owner is None else dr.gather(UInt32, owner, lane)
-        modelled, alive = signals(u, number, point, channels)
-        at = point * stride + number
-        if factors is not None:
-            differences = [m - dr.gather(Float, y, at) for m, y in zip(modelled, measured, strict=True)]
-            correlated: list[Any] = []
-            for i in range(len(differences)):
-                total = differences[0] * dr.gather(Float, factors[i, 0], at)
-                for j in range(1, i + 1):
-                    total = dr.fma(differences[j], dr.gather(Float, factors[i, j], at), total)
-                correlated.append(total)
-            return correlated, alive
-        weighted = [
-            (m - dr.gather(Float, y, at)) * dr.gather(Float, w, at)
-            for m, y, w in zip(modelled, measured, weights, strict=True)
-        ]
-        return weighted, alive
+        return misfit(u, lane // divisor if owner is None else dr.gather(UInt32, owner, lane), point)
 
     # grazing geometries take more work: side by side with their like
     order = np.argsort(np.maximum(stack.theta_i, stack.theta_r)[:, 0], kind="stable").astype(np.uint32)
@@ -259,6 +235,47 @@ def residuals(
         begin=np.searchsorted(np.sort(place), np.arange(blocks + 1)),
         penalty=_block_penalty(space),
     )
+
+
+def misfits(
+    space: Space, stack: Stack, accuracy: str | None, Float: Any
+) -> Callable[[list[Any], Any, Any], tuple[list[Any], Any]]:
+    """What one point of one data set says: ``f(u, number, point)`` over Dr.Jit floats.
+
+    It returns the weighted residuals of the channels, W (model − measured), for the unknowns of the space, and whatever
+    else was computed on the way, see :class:`~pbrdf.inversion.solver.Residuals`.
+    """
+    import drjit as dr
+
+    signals = _Signals(space, stack, accuracy, Float)
+    measured = stack.upload("values", Float)
+    stride = dr.opaque(get_backend().UInt32, len(stack))
+    factors: dict[tuple[int, int], Any] | None = None
+    weights: list[Any] = []
+    if stack.whitening is not None:
+        factors = dict(zip(stack.whitening, stack.upload("whitening", Float), strict=True))
+    else:
+        weights = stack.upload("weights", Float)
+
+    def function(u: list[Any], number: Any, point: Any) -> tuple[list[Any], Any]:
+        modelled, alive = signals(u, number, point, stack.channels)
+        at = point * stride + number
+        if factors is not None:
+            differences = [m - dr.gather(Float, y, at) for m, y in zip(modelled, measured, strict=True)]
+            correlated: list[Any] = []
+            for i in range(len(differences)):
+                total = differences[0] * dr.gather(Float, factors[i, 0], at)
+                for j in range(1, i + 1):
+                    total = dr.fma(differences[j], dr.gather(Float, factors[i, j], at), total)
+                correlated.append(total)
+            return correlated, alive
+        weighted = [
+            (m - dr.gather(Float, y, at)) * dr.gather(Float, w, at)
+            for m, y, w in zip(modelled, measured, weights, strict=True)
+        ]
+        return weighted, alive
+
+    return function
 
 
 def predict(
@@ -349,6 +366,11 @@ def _at_points(space: Space, unknowns: np.ndarray, data: Observations) -> tuple[
         return np.broadcast_to(unknowns[:, None], (len(unknowns), size, unknowns.shape[1])), np.zeros(size)
     place = space.blocks.places(getattr(data, space.blocks.split))
     return space.blocks.at(unknowns, place), place
+
+
+def signals_of(space: Space, data: Sequence[Observations], accuracy: str | None = None) -> Any:
+    """``f(u, number, point, channels)``: channels modelled at a point of a data set, and what else was computed."""
+    return _Signals(space, Stack.of(data), accuracy, get_backend().Float)
 
 
 class _Signals:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-__all__ = ["Goodness", "covariance", "goodness", "prior_spread"]
+__all__ = ["Goodness", "covariance", "goodness", "prior_spread", "typical"]
 
 
 @dataclass(frozen=True)
@@ -96,3 +96,11 @@ def covariance(information: np.ndarray, spread: np.ndarray) -> np.ndarray:
 def prior_spread(lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
     """Standard deviation of a value of which only its bounds are known: range/√12."""
     return (upper - lower) / math.sqrt(12.0)
+
+
+def typical(values: np.ndarray) -> float:
+    """Median size of what was measured; where that is 0, as most of it is black, of what is not; 0 of nothing."""
+    size = np.abs(values[np.isfinite(values)])
+    median = float(np.median(size)) if size.size else 0.0
+    lit = size[size > 0.0]
+    return float(np.median(lit)) if median == 0.0 and lit.size else median

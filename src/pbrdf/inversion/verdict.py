@@ -21,6 +21,7 @@ from pbrdf.inversion.erroranalysis import SIGNIFICANCE, sign_test
 from pbrdf.inversion.estimates import Estimate
 from pbrdf.inversion.holdout import DARK
 from pbrdf.inversion.optimum import Optimum
+from pbrdf.inversion.statistics import typical
 
 __all__ = ["Level", "Stratum", "Verdict", "percent", "quotable", "verdict"]
 
@@ -336,7 +337,7 @@ def _intensity_errors(result: Optimum) -> np.ndarray:
     measured = table["I_measured"].values
     if not np.isfinite(measured).any():
         return np.full(len(measured), np.nan)
-    dark = max(DARK * float(np.nanmedian(np.abs(measured))), np.finfo(float).tiny)
+    dark = max(DARK * typical(measured), np.finfo(float).tiny)
     return (table["I_modelled"].values - measured) / np.maximum(measured, dark)
 
 
@@ -357,7 +358,7 @@ def _polarisation(result: Optimum) -> tuple[np.ndarray, np.ndarray]:
         return np.full(size, np.nan), np.full(size, np.nan)
     modelled = table["I_modelled"].values
     measured = table["I_measured"].values if "I_measured" in table else modelled
-    dark = DARK * float(np.nanmedian(np.abs(measured)))
+    dark = DARK * typical(measured)
     light = np.where(measured > dark, measured, np.nan)
     error, signal, present = np.zeros(size), np.zeros(size), np.zeros(size, dtype=bool)
     for channel in channels:

@@ -1,0 +1,1 @@
+"""Which material a measurement shows: libraries of materials, sets at a stated confidence, calibration."""

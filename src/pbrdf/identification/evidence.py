@@ -1,0 +1,240 @@
+"""How well each material explains a measurement: likelihoods integrated over specimens and nuisances.
+
+A specimen of a material is a draw from a normal distribution of the solver's unknowns (the logarithm of a logarithmic
+parameter, else the parameter), mean μ and covariance LLᵀ. A measurement depends on it through the model and on what the
+instrument adds: a gain, an offset of the sample's angle. All of them are written with independent standard normal
+numbers z; the posterior of z has the density exp(−c(z)) with
+
+    c(z) = ½ Σ (residual/std)² + ½ |z|².
+
+Its maximum ẑ is found by the batched solver, a lane for each material of each measurement, and the integral over z is
+Laplace's approximation, log p = −c(ẑ) − ½ log det H, with H = JᵀJ + 1 at ẑ (MacKay, *Information Theory, Inference, and
+Learning Algorithms* (2003), ch. 27-28). It is exact where the model is linear over the posterior; constants that all
+materials share are left out. 2 c(ẑ) is the squared Mahalanobis distance from the material's predictive distribution:
+for a linear model it follows χ² with as many degrees of freedom as there are measured values, less one for a gain.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from pbrdf.backend import get_backend
+from pbrdf.data.schema import is_ratio
+from pbrdf.errors import FitError
+from pbrdf.identification.material import Material
+from pbrdf.inversion.nuisance import KINDS
+from pbrdf.inversion.observations import Observations
+from pbrdf.inversion.problem import Term, misfits, predict
+from pbrdf.inversion.solver import Residuals, Solution, solve
+from pbrdf.inversion.stack import Stack
+
+__all__ = ["Evidence", "evidence", "posterior"]
+
+#: A gain that is not known is log-normal about the best one, with so many e-folds: a factor of 20 either way.
+GAIN_SPREAD = 3.0
+#: How far from its mean, in standard deviations, a specimen is looked for.
+REACH = 8.0
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What the data say of each material; B measurements, C materials.
+
+    Attributes
+    ----------
+    log_evidence
+        Logarithm of the integrated likelihood, but for a constant of the measurement, shape (B, C).
+    distance
+        Squared Mahalanobis distance of the data from the predictive distribution, shape (B, C).
+    degrees_of_freedom
+        Of χ² that the distance follows for the true material, shape (B,).
+    values
+        Most likely parameters of the specimen by material, in the order of its free parameters, shape (B, P) each.
+    """
+
+    log_evidence: np.ndarray
+    distance: np.ndarray
+    degrees_of_freedom: np.ndarray
+    values: tuple[np.ndarray, ...]
+
+
+def evidence(
+    materials: Sequence[Material],
+    data: Sequence[Observations],
+    *,
+    gain: bool = False,
+    angle: float | None = None,
+    accuracy: str | None = None,
+    max_iterations: int = 50,
+) -> Evidence:
+    """Integrated likelihoods of materials.
+
+    Parameters
+    ----------
+    materials
+        C materials; their models may differ.
+    data
+        B measurements with the same channels, number of geometries and illumination.
+    gain
+        Whether all intensities have a common factor that is not known.
+    angle
+        Standard deviation of an offset of the sample's angle in radians; None for none.
+    accuracy
+        Accuracy of the models; None takes their own.
+    max_iterations
+        Steps of the solver at most.
+
+    Raises
+    ------
+    FitError
+        If the measurements differ in form, or an angle's offset is asked for out of the plane of incidence.
+    """
+    batch, count = len(data), len(materials)
+    log_evidence, distance = np.empty((batch, count)), np.empty((batch, count))
+    values: list[Any] = [None] * count
+    gain = gain and not all(is_ratio(channel) for channel in data[0].channels)
+    factors = _best_gains(materials, data) if gain else None
+    centre = None if factors is None else factors.mean(axis=1)
+    for members in _alike(materials):
+        group = [materials[i] for i in members]
+        start = None if factors is None else factors[:, members]
+        solution = _of_one_model(group, data, start, centre, angle, accuracy, max_iterations)
+        size, shape = len(group[0].mean), (batch, len(group))
+        cost = solution.cost.reshape(shape)
+        logdet = np.linalg.slogdet(solution.information)[1].reshape(shape)
+        log_evidence[:, members] = -cost - 0.5 * logdet
+        # the prior of the gain is none of the data's
+        of_gain = 0.0 if factors is None else solution.u[:, size].reshape(shape) ** 2
+        distance[:, members] = 2.0 * cost - of_gain
+        z = solution.u[:, :size].reshape(*shape, size)
+        for place, member in enumerate(members):
+            own = materials[member]
+            unknowns = np.clip(own.mean + z[:, place] @ own.root.T, *own.space.box)
+            values[member] = own.space.to_parameters(unknowns)
+    measured = np.array([int(np.isfinite(o.std).sum()) for o in data])
+    return Evidence(log_evidence, distance, measured - int(gain), tuple(values))
+
+
+def posterior(
+    material: Material, data: Sequence[Observations], *, gain: bool = False, accuracy: str | None = None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
+    """Mode and information of z for one material, and the logarithm of the gain about which z counts it.
+
+    Returns
+    -------
+    z, information, centre
+        Shapes (B, Z), (B, Z, Z) and (B,), None where the gain is known. z holds the specimen's numbers and then the
+        gain's: ln g = centre + ``GAIN_SPREAD`` z.
+    """
+    factors = _best_gains([material], data) if gain else None
+    centre = None if factors is None else factors.mean(axis=1)
+    solution = _of_one_model([material], data, factors, centre, None, accuracy, 50)
+    return solution.u, solution.information, centre
+
+
+def _alike(materials: Sequence[Material]) -> list[list[int]]:
+    """Numbers of the materials whose models are one kernel."""
+    groups: dict[Any, list[int]] = {}
+    for number, material in enumerate(materials):
+        groups.setdefault(material.form, []).append(number)
+    return list(groups.values())
+
+
+def _best_gains(materials: Sequence[Material], data: Sequence[Observations]) -> np.ndarray:
+    """Logarithm of the gain at which the mean of each material fits the intensities best, shape (B, C)."""
+    first = data[0]
+    rows = [c for c, name in enumerate(first.channels) if not is_ratio(name)]
+    names = [first.channels[c] for c in rows]
+    gains = np.empty((len(data), len(materials)))
+    shared = all(
+        np.array_equal(getattr(o, name), getattr(first, name))
+        for o in data[1:]
+        for name in ("theta_i", "theta_r", "phi")
+    )
+    modelled: np.ndarray | None = None
+    for c, material in enumerate(materials):
+        for b, one in enumerate(data):
+            if modelled is None or not shared or b == 0:
+                found = predict(material.space, material.mean, one, names)
+                modelled = np.stack([found[name] for name in names])
+            weights = 1.0 / one.std[rows] ** 2
+            along = (weights * modelled * one.values[rows]).sum()
+            gains[b, c] = max(along / (weights * modelled**2).sum(), 1e-12)
+    return np.log(gains)
+
+
+def _of_one_model(
+    materials: Sequence[Material],
+    data: Sequence[Observations],
+    start_gain: np.ndarray | None,
+    centre_gain: np.ndarray | None,
+    angle: float | None,
+    accuracy: str | None,
+    max_iterations: int,
+) -> Solution:
+    """Posterior modes, lane b C + c for material c and measurement b; unknowns z of the specimen, gain, angle."""
+    import drjit as dr
+
+    backend = get_backend()
+    Float, UInt32 = backend.Float, backend.UInt32
+    batch, count = len(data), len(materials)
+    space = materials[0].space
+    size = len(space.free)
+    nuisances = (["gain"] if start_gain is not None else []) + ([] if angle is None else ["angle"])
+    space = replace(
+        space,
+        free=(*space.free, *(KINDS[kind] for kind in nuisances)),
+        lower=np.append(space.lower, [KINDS[kind].lower for kind in nuisances]),
+        upper=np.append(space.upper, [KINDS[kind].upper for kind in nuisances]),
+        terms=(*space.terms, *(Term(kind, nuisance=True) for kind in nuisances)),
+    )
+    stack = Stack.of(data)
+    misfit = misfits(space, stack, accuracy, Float)
+    low, high = materials[0].space.box
+    means = [backend.upload(Float, np.array([m.mean[i] for m in materials])) for i in range(size)]
+    roots = {
+        (i, j): backend.upload(Float, np.array([m.root[i, j] for m in materials]))
+        for i in range(size)
+        for j in range(i + 1)
+    }
+    bounds = [(dr.opaque(Float, a), dr.opaque(Float, b)) for a, b in zip(low, high, strict=True)]
+    centre = None
+    if start_gain is not None:
+        centre = backend.upload(Float, centre_gain)
+    spread_angle = None if angle is None else dr.opaque(Float, angle)
+    kinds = dr.opaque(UInt32, count)
+
+    def function(z: list[Any], lane: Any, point: Any) -> tuple[list[Any], Any]:
+        number = lane // kinds
+        kind = lane - number * kinds
+        u = []
+        for i in range(size):
+            value = dr.gather(Float, means[i], kind)
+            for j in range(i + 1):
+                value = dr.fma(dr.gather(Float, roots[i, j], kind), z[j], value)
+            u.append(dr.clip(value, *bounds[i]))
+        rest = z[size:]
+        if centre is not None:
+            u.append(dr.fma(GAIN_SPREAD, rest.pop(0), dr.gather(Float, centre, number)))
+        if spread_angle is not None:
+            u.append(spread_angle * rest.pop(0))
+        return misfit(u, number, point)
+
+    def penalty(z: list[Any]) -> list[tuple[int, Any, Any]]:
+        return [(i, value, 1.0) for i, value in enumerate(z)]
+
+    unknowns = size + len(nuisances)
+    start = np.zeros((batch * count, unknowns))
+    if start_gain is not None:
+        assert centre_gain is not None
+        start[:, size] = ((start_gain - centre_gain[:, None]) / GAIN_SPREAD).ravel()
+    problem = Residuals(function, stack.points, penalty)
+    limit = np.full(unknowns, REACH)
+    solution = solve(problem, start, -limit, limit, max_iterations=max_iterations, tolerance=1e-6)
+    if not np.isfinite(solution.cost).all():
+        raise FitError("the likelihood of a material is not finite: check the data's values and the library")
+    return solution

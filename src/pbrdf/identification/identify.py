@@ -1,0 +1,284 @@
+"""Which of a library's materials a measurement shows: a set at a stated confidence, probabilities, or none of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pbrdf.data.schema import NORMALISED, is_ratio
+from pbrdf.data.validation import validate
+from pbrdf.errors import FitError
+from pbrdf.identification.conformal import Calibration, calibrate, nominal, probabilities
+from pbrdf.identification.evidence import Evidence, evidence
+from pbrdf.identification.library import Library
+from pbrdf.inversion.noise import Noise, parse_noise
+from pbrdf.inversion.observations import Observations
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = [
+    "Candidate",
+    "Identification",
+    "calibrate_library",
+    "check_request",
+    "identify",
+    "shares",
+    "unknown_gain",
+]
+
+#: Standard deviation of an unknown offset of the sample's angle, radians (docs/fitting.md, nuisance terms).
+ANGLE_OFFSET = math.radians(0.2)
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One material as a candidate for a measurement.
+
+    Attributes
+    ----------
+    name
+        Of the material.
+    probability
+        That it is this one, given that it is one of the library.
+    p_value
+        How often a measurement of this material is as unlike it as this one.
+    distance
+        Squared Mahalanobis distance of the measurement from what the material's specimens give.
+    values
+        Most likely parameters of the specimen by name.
+    accepted
+        Whether it belongs to the set.
+    """
+
+    name: str
+    probability: float
+    p_value: float
+    distance: float
+    values: dict[str, float]
+    accepted: bool
+
+
+@dataclass(frozen=True)
+class Identification:
+    """What a measurement says about the materials of a library.
+
+    Attributes
+    ----------
+    candidates
+        All materials, the most probable first.
+    confidence
+        Of the set.
+    degrees_of_freedom
+        Of the χ² that the distances follow.
+    gain
+        Whether a common factor of the intensities was taken as not known.
+    angle
+        Standard deviation of the offset of the sample's angle in radians; None for none.
+    noise
+        Where the uncertainties come from, in words.
+    calibration
+        In words, what the p-values rest on.
+    data
+        The measurement as it was compared.
+    library
+        The library.
+    """
+
+    candidates: tuple[Candidate, ...]
+    confidence: float
+    degrees_of_freedom: int
+    gain: bool
+    angle: float | None
+    noise: str
+    calibration: str
+    data: Observations = field(repr=False)
+    library: Library = field(repr=False)
+
+    @property
+    def materials(self) -> list[str]:
+        """The set: names of the materials that the measurement may show at the stated confidence, may be empty."""
+        return [candidate.name for candidate in self.candidates if candidate.accepted]
+
+    @property
+    def none_of_these(self) -> bool:
+        """Whether the measurement is like none of the library's materials."""
+        return not self.materials
+
+    def __getitem__(self, name: str) -> Candidate:
+        for candidate in self.candidates:
+            if candidate.name == name:
+                return candidate
+        raise KeyError(name)
+
+
+def unknown_gain(dataset: xr.Dataset) -> bool:
+    """Whether a factor of the intensities is not known: their scale is arbitrary, or they are radiances or counts."""
+    quantity = dataset.attrs["quantity"]
+    if quantity == NORMALISED:
+        return False
+    stated = dataset.attrs.get("scale")
+    if stated is not None:
+        return bool(stated == "arbitrary")
+    return quantity in ("radiance", "dn")
+
+
+def identify(
+    dataset: xr.Dataset,
+    library: Library,
+    *,
+    confidence: float = 0.95,
+    gain: bool | None = None,
+    angle: float | None = None,
+    noise: Noise | str | None = None,
+    prior: Mapping[str, float] | None = None,
+    calibration: Calibration | None = None,
+) -> Identification:
+    """Identify the material of a measurement.
+
+    Parameters
+    ----------
+    dataset
+        Data set of the project's schema, any geometries.
+    library
+        The materials.
+    confidence
+        How often the set is to hold the true material, 0 to 1.
+    gain
+        Whether a common factor of the intensities is not known; None takes what the data set says of its scale.
+    angle
+        Standard deviation of an offset of the sample's angle in radians (in the plane of incidence); None for none.
+    noise
+        Stated noise, see :func:`pbrdf.fit`.
+    prior
+        How common the materials are, by name; those left out share what is left of 1. None: all alike.
+    calibration
+        Of measurements like this one; None takes the library's, and where it has none, the χ² of a linear model.
+
+    Raises
+    ------
+    FitError, DataError
+        If the library is empty, an option is none, or the data are not valid.
+    """
+    validate(dataset)
+    check_request(library, confidence)
+    if isinstance(noise, str):
+        noise = parse_noise(noise)
+    observed = Observations.from_dataset(dataset, noise)
+    if gain is None:
+        gain = unknown_gain(dataset)
+    gain = gain and not all(is_ratio(channel) for channel in observed.channels)
+    found = evidence(library.materials, [observed], gain=gain, angle=angle)
+    used = calibration or library.calibration
+    words = "χ² of a linear model with Gaussian scatter; no calibration"
+    if used is not None:
+        words = used.measurements or "labelled measurements"
+    return Identification(
+        candidates=_candidates(found, library, confidence, shares(library, prior), used),
+        confidence=confidence,
+        degrees_of_freedom=int(found.degrees_of_freedom[0]),
+        gain=gain,
+        angle=angle,
+        noise="stated" if noise is not None else "of the data set" if observed.std_known else "assumed",
+        calibration=words,
+        data=observed,
+        library=library,
+    )
+
+
+def calibrate_library(
+    library: Library,
+    labelled: Sequence[tuple[str, xr.Dataset]],
+    *,
+    gain: bool | None = None,
+    angle: float | None = None,
+    noise: Noise | str | None = None,
+    measurements: str = "",
+) -> Library:
+    """The library with a calibration by measurements whose materials are known.
+
+    Parameters
+    ----------
+    library
+        The materials.
+    labelled
+        Pairs of a material's name and a data set.
+    gain, angle, noise
+        As for :func:`identify`: the calibration holds for measurements that are treated alike.
+    measurements
+        Where they come from, in words.
+
+    Raises
+    ------
+    FitError
+        If a label is none of the library's materials, or there are no measurements.
+    """
+    if not labelled:
+        raise FitError("calibration: there are no labelled measurements")
+    if isinstance(noise, str):
+        noise = parse_noise(noise)
+    rows, scores, truth = [], [], []
+    for name, dataset in labelled:
+        truth.append(library.materials.index(library[name]))
+        validate(dataset)
+        observed = Observations.from_dataset(dataset, noise)
+        free = unknown_gain(dataset) if gain is None else gain
+        found = evidence(library.materials, [observed], gain=free, angle=angle)
+        rows.append(found.log_evidence[0])
+        scores.append(nominal(found.distance, found.degrees_of_freedom)[0])
+    calibration = calibrate(library.names, np.array(rows), np.array(scores), np.array(truth), measurements)
+    return Library(library.materials, calibration)
+
+
+def check_request(library: Library, confidence: float) -> None:
+    """Raise FitError if the library is empty or the confidence is none."""
+    if not library.materials:
+        raise FitError("the library has no material: add one first (`pbrdf library add NAME FIT`)")
+    if not 0.0 < confidence < 1.0:
+        raise FitError(f"confidence={confidence:g}: give a number between 0 and 1, like 0.95")
+
+
+def shares(library: Library, prior: Mapping[str, float] | None) -> np.ndarray:
+    """Prior probabilities from those stated by name, shape (C,); raises FitError where they are none."""
+    count = len(library.materials)
+    if not prior:
+        return np.full(count, 1.0 / count)
+    for name, share in prior.items():
+        _ = library[name]
+        if not 0.0 <= share <= 1.0:
+            raise FitError(f"prior: {name}={share:g} must be within 0 … 1")
+    stated = sum(prior.values())
+    others = count - len(prior)
+    if stated > 1.0 + 1e-9 or (others == 0 and abs(stated - 1.0) > 1e-6):
+        raise FitError(f"prior: the shares add up to {stated:g}, they must add up to 1")
+    rest = max(1.0 - stated, 0.0) / others if others else 0.0
+    return np.array([prior.get(name, rest) for name in library.names])
+
+
+def _candidates(
+    found: Evidence, library: Library, confidence: float, prior: np.ndarray, calibration: Calibration | None
+) -> tuple[Candidate, ...]:
+    temperature = 1.0 if calibration is None else calibration.temperature
+    share = probabilities(found.log_evidence, prior, temperature)[0]
+    p = nominal(found.distance, found.degrees_of_freedom)
+    if calibration is not None:
+        p = calibration.p_values(p)
+    made = [
+        Candidate(
+            name=material.name,
+            probability=float(share[c]),
+            p_value=float(p[0, c]),
+            distance=float(found.distance[0, c]),
+            values={
+                **material.space.fixed,
+                **dict(zip(material.space.names, map(float, found.values[c][0]), strict=True)),
+            },
+            accepted=bool(p[0, c] > 1.0 - confidence),
+        )
+        for c, material in enumerate(library.materials)
+    ]
+    return tuple(sorted(made, key=lambda candidate: -candidate.probability))
