@@ -77,7 +77,9 @@ def test_a_store_goes_on_and_does_nothing_twice(store, monkeypatch):
     run_units(store, worker=(1, 2))
     done = []
     do = type(store).do
-    monkeypatch.setattr(type(store), "do", lambda self, number: (done.append(number), do(self, number)))
+    monkeypatch.setattr(
+        type(store), "do", lambda self, number, *told: (done.append(number), do(self, number, *told))
+    )
     again = store_at(store.path)
     assert run_units(again).found == 3
     assert done == [1, 3, 5]
