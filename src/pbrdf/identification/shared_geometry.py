@@ -15,15 +15,13 @@ from typing import Any
 import numpy as np
 from scipy.special import gammainccinv
 
-from pbrdf.backend import get_backend
 from pbrdf.data.schema import is_ratio
 from pbrdf.identification.emulator import Emulator
 from pbrdf.identification.evidence import GAIN_SPREAD, evidence
-from pbrdf.identification.evidence import REACH as LIMIT
 from pbrdf.identification.material import Material
+from pbrdf.identification.quadratic_modes import Tables
 from pbrdf.identification.screen import Screen
 from pbrdf.inversion.observations import Observations
-from pbrdf.inversion.solver import Residuals, solve
 
 __all__ = ["SharedGeometry"]
 
@@ -159,111 +157,17 @@ class SharedGeometry:
         gains: np.ndarray | None,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Log evidence and distance of pairs, shape (L,) each."""
-        import drjit as dr
-
-        backend = get_backend()
-        Float, UInt32 = backend.Float, backend.UInt32
         if not len(pixel):
             return np.empty(0), np.empty(0)
-        used, own_kind = np.unique(kind, return_inverse=True)
+        used, own = np.unique(kind, return_inverse=True)
         emulators = [self.emulators[c] for c in used]
-        materials = [e.material for e in emulators]
-        channels = range(values.shape[1])
-        points = values.shape[2]
+        centre = None if gains is None else gains.mean(axis=1)
+        scaled = self.screen.intensities
+        tables = Tables(emulators, values.reshape(len(values), -1), std.reshape(len(std), -1), scaled, centre)
         size = emulators[0].nodes.shape[1]
-        terms = emulators[0].table.shape[-1]
-        nodes = len(emulators[0].nodes)
-        measured = [backend.upload(Float, values[:, c].ravel()) for c in channels]
-        weights = [backend.upload(Float, (1.0 / std[:, c]).ravel()) for c in channels]
-        table = backend.upload(Float, np.concatenate([e.table.ravel() for e in emulators]))
-        centres = backend.upload(Float, np.concatenate([e.nodes.ravel() for e in emulators]))
-        of_kind = np.array([_described(e) for e in emulators])
-        described = backend.upload(Float, of_kind.ravel())
-        width = of_kind.shape[1]
-        axes = backend.upload(UInt32, np.array([e.axis for e in emulators], dtype=np.uint32))
-        numbers = backend.upload(UInt32, pixel.astype(np.uint32))
-        kinds = backend.upload(UInt32, own_kind.astype(np.uint32))
-        centre = None
-        if gains is not None:
-            centre = backend.upload(Float, gains.mean(axis=1))
-        stride = dr.opaque(UInt32, points)
-        scaled = [not is_ratio(channel) for channel in self.like.channels]
-
-        def function(z: list[Any], lane: Any, point: Any) -> tuple[list[Any], Any]:
-            number, own = dr.gather(UInt32, numbers, lane), dr.gather(UInt32, kinds, lane)
-            row = own * width
-            read = lambda i: dr.gather(Float, described, row + i)  # noqa: E731
-            u, at = [], 4 * size
-            for i in range(size):
-                value = read(i)
-                for j in range(i + 1):
-                    value = dr.fma(read(at), z[j], value)
-                    at += 1
-                u.append(dr.clip(value, read(size + i), read(2 * size + i)))
-            axis = dr.gather(UInt32, axes, own)
-            along = u[0]
-            for i in range(1, size):
-                along = dr.select(axis == i, u[i], along)
-            # the node nearest to it
-            position = (dr.detach(along) - read(3 * size)) * read(3 * size + 1)
-            node = own * nodes + UInt32(dr.clip(position + 0.5, 0.0, nodes - 1.0))
-            step = [u[i] - dr.gather(Float, centres, node * size + i) for i in range(size)]
-            factor = None
-            if centre is not None:
-                factor = dr.exp(dr.fma(GAIN_SPREAD, z[size], dr.gather(Float, centre, number)))
-            here = number * stride + point
-            place = (node * stride + point) * (len(channels) * terms)
-            residuals = []
-            for c in channels:
-                term = lambda i, c=c: dr.gather(Float, table, place + (c * terms + i))  # noqa: E731
-                value, at = term(0), 1 + size
-                for i in range(size):
-                    slope = term(1 + i)
-                    for j in range(i + 1):
-                        slope = dr.fma(term(at), step[j], slope)
-                        at += 1
-                    value = dr.fma(slope, step[i], value)
-                if factor is not None and scaled[c]:
-                    value = value * factor
-                residuals.append(
-                    (value - dr.gather(Float, measured[c], here)) * dr.gather(Float, weights[c], here)
-                )
-            return residuals, None
-
-        def penalty(z: list[Any]) -> list[tuple[int, Any, Any]]:
-            return [(i, value, 1.0) for i, value in enumerate(z)]
-
-        unknowns = size + int(gains is not None)
-        start = np.zeros((len(pixel), unknowns))
-        if gains is not None:
-            start[:, size] = (gains[pixel, kind] - gains.mean(axis=1)[pixel]) / GAIN_SPREAD
-        limit = np.full(unknowns, LIMIT)
-        solution = solve(
-            Residuals(function, points, penalty), start, -limit, limit, max_iterations=50, tolerance=1e-6
-        )
-        of_gain = solution.u[:, size] ** 2 if gains is not None else 0.0
-        return -solution.cost - _half_logdet(solution.information), 2.0 * solution.cost - of_gain
-
-
-def _described(emulator: Emulator) -> np.ndarray:
-    """Mean, bounds, first node with the inverse distance of nodes, and root of a material, in a row."""
-    own = emulator.material
-    size = len(own.mean)
-    first = np.zeros(size)
-    first[:2] = emulator.first[: min(size, 2)]
-    rows, columns = np.tril_indices(size)
-    return np.concatenate([own.mean, *own.space.box, first, own.root[rows, columns]])
-
-
-def _half_logdet(matrices: np.ndarray) -> np.ndarray:
-    """½ log det of positive definite matrices, shape (L, P, P), all at a time."""
-    size = matrices.shape[1]
-    A = [[np.ascontiguousarray(matrices[:, i, j]) for j in range(i + 1)] for i in range(size)]
-    result = np.zeros(len(matrices))
-    for k in range(size):
-        result += np.log(A[k][k])
-        for i in range(k + 1, size):
-            factor = A[i][k] / A[k][k]
-            for j in range(k + 1, i + 1):
-                A[i][j] = A[i][j] - factor * A[j][k]
-    return 0.5 * result
+        start = np.zeros((len(pixel), size + int(self.gain)))
+        if gains is not None and centre is not None:
+            start[:, size] = (gains[pixel, kind] - centre[pixel]) / GAIN_SPREAD
+        cost, half_log, z = tables.modes(own, pixel, start)
+        of_gain = z[:, size] ** 2 if self.gain else 0.0
+        return -cost - half_log, 2.0 * cost - of_gain
