@@ -1,8 +1,8 @@
 """Modes of the posteriors of specimens whose signals come from tables, many pixels and materials at a time.
 
-What :mod:`pbrdf.identification.evidence` minimises, by Gauss's and Newton's method with exact derivatives of the tables'
-polynomials: a step that raises the cost is halved. A pass over the data is one kernel for all pairs of a pixel and a
-material. A pair stops where the step promises next to nothing; that is taken unseen.
+What :mod:`pbrdf.identification.evidence` minimises, by Gauss's and Newton's method with exact derivatives of the
+tables' polynomials: a step that raises the cost is halved. A pass over the data is one kernel for all pairs of a pixel
+and a material. A pair stops where the step promises next to nothing; that is taken unseen.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from pbrdf.identification.evidence import GAIN_SPREAD, REACH
 __all__ = ["Tables"]
 
 #: A pair stops where its cost is this near its minimum by the quadratic model, or after so many passes.
-NEAR, PASSES = 2e-3, 24
+NEAR, PASSES = 5e-3, 12
 #: Numbers that are read together.
 PACKET = 4
 
@@ -112,7 +112,7 @@ class Tables:
         return cost, half_log, z
 
     def _pass(self, kind: np.ndarray, pixel: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Cost, ½ log det of the information, what a step promises, and the step; shapes (L,), (L,), (L,) and (L, Z)."""
+        """Cost, ½ log det of the information, what a step promises, and the step; shapes (L,) thrice and (L, Z)."""
         import drjit as dr
 
         backend = get_backend()
@@ -188,13 +188,20 @@ class Tables:
 
         zero = dr.zeros(Float, count)
         _, cost, g, packed = dr.while_loop(
-            (UInt32(0), Float(zero), [Float(zero) for _ in z], [Float(zero) for _ in range(width * (width + 1) // 2)]),
+            (
+                UInt32(0),
+                Float(zero),
+                [Float(zero) for _ in z],
+                [Float(zero) for _ in range(width * (width + 1) // 2)],
+            ),
             lambda d, *_: d < self.data,
             body,
             mode="symbolic",
             label="quadratic modes",
         )
-        A = [[packed[max(i, j) * (max(i, j) + 1) // 2 + min(i, j)] for j in range(width)] for i in range(width)]
+        A = [
+            [packed[max(i, j) * (max(i, j) + 1) // 2 + min(i, j)] for j in range(width)] for i in range(width)
+        ]
         R = [
             [dr.select(free[i], root[i, j], 0.0) if j <= i else 0.0 for j in range(size)]
             + [0.0] * (width - size)
@@ -202,8 +209,13 @@ class Tables:
         ]
         if width > size:
             R.append([0.0] * size + [Float(1.0)])
-        gradient = [_total([R[i][a] * g[i] for i in range(a, width) if _there(R[i][a])]) + z[a] for a in range(width)]
-        half = [[_total([A[i][k] * R[k][b] for k in range(b, width) if _there(R[k][b])]) for b in range(width)] for i in range(width)]
+        gradient = [
+            _total([R[i][a] * g[i] for i in range(a, width) if _there(R[i][a])]) + z[a] for a in range(width)
+        ]
+        half = [
+            [_total([A[i][k] * R[k][b] for k in range(b, width) if _there(R[k][b])]) for b in range(width)]
+            for i in range(width)
+        ]
         L: list[list[Any]] = []
         half_log: Any = 0.0
         for a in range(width):

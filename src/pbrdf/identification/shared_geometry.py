@@ -95,7 +95,7 @@ class SharedGeometry:
         measured = np.isfinite(std)
         freedom = measured.sum(axis=(1, 2)) - int(self.gain)
         flat = values.reshape(count, -1), std.reshape(count, -1)
-        bound = self.screen.distance(*flat)
+        bound, specimen = self.screen.distance(*flat)
         rare = np.minimum(BEYOND, 0.01 * self.least)
         different, place = np.unique(np.maximum(freedom, 1), return_inverse=True)
         limit = 2.0 * gammainccinv(0.5 * different[:, None], rare)[place]
@@ -109,14 +109,14 @@ class SharedGeometry:
             kind, pixel = np.nonzero(keep[:, group].T)
             kind = np.asarray(group)[kind]
             if isinstance(group, list):
-                found = self._solved(kind, pixel, values, std, gains)
+                found = self._solved(kind, pixel, values, std, gains, specimen)
             else:
                 found = self._exact(kind, pixel, values, std)
             log_evidence[pixel, kind], distance[pixel, kind] = found
         return log_evidence, distance, freedom
 
     def _groups(self, keep: np.ndarray, std: np.ndarray) -> list[Any]:
-        """Numbers of the materials whose tables will do, by the number of their unknowns, in lists; others in tuples."""
+        """Numbers of the materials whose tables will do, in lists of as many unknowns; others in tuples."""
         groups: dict[int, list[int]] = {}
         exact = []
         for number, emulator in enumerate(self.emulators):
@@ -155,6 +155,7 @@ class SharedGeometry:
         values: np.ndarray,
         std: np.ndarray,
         gains: np.ndarray | None,
+        specimen: np.ndarray,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Log evidence and distance of pairs, shape (L,) each."""
         if not len(pixel):
@@ -166,6 +167,7 @@ class SharedGeometry:
         tables = Tables(emulators, values.reshape(len(values), -1), std.reshape(len(std), -1), scaled, centre)
         size = emulators[0].nodes.shape[1]
         start = np.zeros((len(pixel), size + int(self.gain)))
+        start[:, :size] = specimen[pixel, kind, :size]
         if gains is not None and centre is not None:
             start[:, size] = (gains[pixel, kind] - centre[pixel]) / GAIN_SPREAD
         cost, half_log, z = tables.modes(own, pixel, start)
