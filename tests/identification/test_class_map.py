@@ -105,9 +105,10 @@ def cube(shape=(8, 30), seed=2, noise=0.01, gain=False):
 
 def test_parameter_map():
     ds, truth = parameter_map()
-    found = identify_map(ds, LIBRARY)
     known = truth < 5
-    assert (found["material"].values[known] == truth[known]).mean() >= 0.9
+    wide = identify_map(ds, LIBRARY, confidence=0.99)
+    assert (wide["material"].values[known] == truth[known]).mean() >= 0.95
+    found = identify_map(ds, LIBRARY)
     best = found["probability"].values.argmax(axis=0)
     assert (best[known] == truth[known]).mean() >= 0.95
     assert (found["material"].values[~known] == NONE_OF_THESE).mean() >= 0.95
@@ -331,8 +332,8 @@ def test_a_calibration_keeps_what_is_far_by_chi_square():
 def test_read_from_a_store_block_by_block(tmp_path, monkeypatch):
     pytest.importorskip("zarr")
     ds, _ = cube((4, 12))
-    ds.to_zarr(tmp_path / "cube.zarr")
-    with xr.open_zarr(tmp_path / "cube.zarr", chunks=None) as opened:
+    ds.to_zarr(tmp_path / "cube.zarr", consolidated=False)
+    with xr.open_zarr(tmp_path / "cube.zarr", chunks=None, consolidated=False) as opened:
         monkeypatch.setattr(class_map, "PIXELS", 24)
         found = identify_map(opened, LIBRARY)
         assert not isinstance(opened["I"].variable._data, np.ndarray)
