@@ -184,7 +184,7 @@ def of_stokes(
                     SharedGeometry.of(materials, like, gain=gain, least=least, temperature=temperature)
                 )
             return known, *tables[0].evidence(values, std)
-        angles = [angle[chosen] for angle in angles]
+        angles = [np.broadcast_to(angle, (known.size, angle.shape[1]))[chosen] for angle in angles]
         data = [
             replace(like, theta_i=i, theta_r=r, phi=p, values=v, std=s)
             for i, r, p, v, s in zip(*angles, values, std, strict=True)

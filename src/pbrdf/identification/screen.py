@@ -20,7 +20,7 @@ import numpy as np
 from pbrdf.data.schema import is_ratio
 from pbrdf.identification.emulator import REACH, Emulator
 
-__all__ = ["Screen"]
+__all__ = ["DATA", "Screen"]
 
 #: Data that are looked at, at most, and random specimens of each material.
 DATA, SPECIMENS = 36, 1024
@@ -29,7 +29,7 @@ WIDER = 1.5
 #: A datum is looked at that so many of the pixels have.
 PART = 0.7
 #: Pixels share errors R whose logarithms to base 2 are that near each other; R is above those of so many of them.
-NEAR, ABOVE = 0.5, 0.9
+NEAR, ABOVE = 0.5, 0.995
 #: By how much more the data scatter where they are divided by their mean intensity.
 NORMALISED = 1.5
 

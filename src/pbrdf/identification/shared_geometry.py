@@ -20,7 +20,7 @@ from pbrdf.identification.emulator import Emulator
 from pbrdf.identification.evidence import GAIN_SPREAD, evidence
 from pbrdf.identification.material import Material
 from pbrdf.identification.quadratic_modes import Tables
-from pbrdf.identification.screen import Screen
+from pbrdf.identification.screen import DATA, Screen
 from pbrdf.inversion.observations import Observations
 
 __all__ = ["SharedGeometry"]
@@ -30,7 +30,9 @@ __all__ = ["SharedGeometry"]
 BEYOND, FARTHER = 1e-6, 40.0
 #: The tables' squared errors in units of the data's, summed, are no more than this part of the spread of the distance,
 #: which is √(2 D) for D data; else the model itself is evaluated. Judged by so many pixels.
-TOLERATED, JUDGES = 0.1, 1000
+TOLERATED, JUDGES = 0.5, 1000
+#: Pixels for which a model is evaluated together.
+TOGETHER = 1 << 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,9 +100,11 @@ class SharedGeometry:
         bound, specimen = self.screen.distance(*flat)
         rare = np.minimum(BEYOND, 0.01 * self.least)
         different, place = np.unique(np.maximum(freedom, 1), return_inverse=True)
-        limit = 2.0 * gammainccinv(0.5 * different[:, None], rare)[place]
+        # a calibration speaks of the distance of all data
+        looked = np.where(self.least < 1.0, different[:, None], np.minimum(different, DATA)[:, None])
+        limit = 2.0 * gammainccinv(0.5 * looked, rare)[place]
         nearest = bound.min(axis=1, keepdims=True)
-        keep = bound <= np.maximum(limit, nearest) + FARTHER * max(self.temperature, 1.0)
+        keep = bound <= np.maximum(limit, nearest + FARTHER * max(self.temperature, 1.0))
         log_evidence = np.full((count, kinds), -np.inf)
         distance = np.full((count, kinds), np.inf)
         gains = self._gains(*flat) if self.gain else None
@@ -144,9 +148,13 @@ class SharedGeometry:
     ) -> tuple[np.ndarray, np.ndarray]:
         if not len(pixel):
             return np.empty(0), np.empty(0)
-        data = [replace(self.like, values=values[n], std=std[n]) for n in pixel]
-        found = evidence([self.emulators[kind[0]].material], data, gain=self.gain)
-        return found.log_evidence[:, 0], found.distance[:, 0]
+        log_evidence, distance = np.empty(len(pixel)), np.empty(len(pixel))
+        for begin in range(0, len(pixel), TOGETHER):
+            part = slice(begin, begin + TOGETHER)
+            data = [replace(self.like, values=values[n], std=std[n]) for n in pixel[part]]
+            found = evidence([self.emulators[kind[0]].material], data, gain=self.gain)
+            log_evidence[part], distance[part] = found.log_evidence[:, 0], found.distance[:, 0]
+        return log_evidence, distance
 
     def _solved(
         self,
