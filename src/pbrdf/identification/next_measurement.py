@@ -212,17 +212,34 @@ def _protocol(
     if isinstance(geometries, Protocol):
         return geometries
     if geometries is not None:
-        angles = np.broadcast_arrays(*(np.atleast_1d(np.asarray(a, dtype=float)) for a in geometries))
-        size = len(angles[0])
-        return Protocol(*angles, np.ones(size, dtype=int), np.full(size, np.nan))
+        theta_i, theta_r, phi = np.broadcast_arrays(
+            *(np.atleast_1d(np.asarray(angle, dtype=float)) for angle in geometries)
+        )
+        return Protocol(
+            theta_i,
+            theta_r,
+            phi,
+            np.ones(len(phi), dtype=int),
+            np.full(len(phi), np.nan),
+            name="given geometries",
+        )
     found = [in_plane_candidates(material.model) for material in materials]
-    columns = [
-        np.concatenate([getattr(one, name) for one in found])
-        for name in ("theta_i", "theta_r", "phi", "group", "sample_angle")
-    ]
+
+    def joined(name: str) -> np.ndarray:
+        return np.concatenate([getattr(one, name) for one in found])
+
     # positions of the camera are the same for all, sample angles of wide lobes may stand among those of narrow ones
-    _, kept = np.unique(np.round(np.stack(columns[3:], axis=1), 6), axis=0, return_index=True)
-    return Protocol(*(column[kept] for column in columns), laboratory="scattering", name=found[0].name)
+    group, sample_angle = joined("group"), joined("sample_angle")
+    _, kept = np.unique(np.round(np.stack([group, sample_angle], axis=1), 6), axis=0, return_index=True)
+    return Protocol(
+        joined("theta_i")[kept],
+        joined("theta_r")[kept],
+        joined("phi")[kept],
+        group[kept],
+        sample_angle[kept],
+        "scattering",
+        found[0].name,
+    )
 
 
 def _at(protocol: Protocol, data: Observations) -> Observations:
