@@ -3,14 +3,15 @@
 Two automotive coatings (Cornell, ``acryl_blue`` and ``mystique``: intensities at 31 wavelengths, each taken for a
 specimen) and the two reference paints of a thermal-infrared goniometer (``mwir-paint``, one band: each position of the
 camera is a measurement). Of each wavelength, the incidences 10°, 30°, 50° and 70° give the specimen of the library, and
-20°, 40° and 60° a measurement to identify; of the infrared paints every other position of the camera. Wavelengths take
-turns in what they are for: library, calibration, test.
+20°, 40° and 60° a measurement to identify each; of the infrared paints every other position of the camera. Wavelengths
+take turns in what they are for: library, calibration, test. The infrared paints have too few positions to calibrate
+with: theirs are all tests, and their sets those by χ².
 
-Each material has the model that ``pbrdf compare`` ranks first on the library's data of its brightest specimen. The noise
-of a measurement is what the library's fits miss by: a part of the intensity where it is bright, and an absolute part
-from where it is dark, pooled over all fits and so too small for the material that is described worst. Neighbours share
-the error of a model, so that a measurement is a few geometries only. Rows: intensities as they are, and their shape only
-(gain not known); sets by χ² of that noise, and calibrated.
+Each material has the model that ``pbrdf compare`` ranks first on the library's data of its brightest specimen. The
+noise of a measurement is what the library's fits miss by: a part of the intensity where it is bright, and an absolute
+part from where it is dark, pooled over all fits and so too small for the material that is described worst. Neighbours
+share the error of a model, so that a measurement is a few geometries only. Rows: intensities as they are, and their
+shape only (gain not known); sets by χ² of that noise, and calibrated.
 
 Usage: ``python benchmarks/identification_real.py DATA [--json FILE]`` with the folder of the measured data.
 """
@@ -53,22 +54,22 @@ def thinned(data: xr.Dataset, count: int) -> xr.Dataset:
     )
 
 
-def automotive(data: Path, name: str) -> tuple[list[xr.Dataset], list[xr.Dataset]]:
-    """Measurements for the library and to identify, one of each for every wavelength."""
+def automotive(data: Path, name: str) -> tuple[list[xr.Dataset], list[list[xr.Dataset]]]:
+    """Of each wavelength the measurement for the library, and those to identify."""
     whole = pbrdf.read(data / "cornell-automotive" / f"{name}.brdf")
     groups = whole["group"].values.astype(int)
     low = np.degrees(whole["theta_r"].values) < 75.0
-    found: tuple[list[xr.Dataset], list[xr.Dataset]] = ([], [])
-    for wavelength in np.unique(whole["wavelength"].values):
-        for incidence, count, part in zip(
-            (LIBRARY_INCIDENCE, TEST_INCIDENCE), (MANY, FEW), found, strict=True
-        ):
-            chosen = (whole["wavelength"].values == wavelength) & np.isin(groups, incidence) & low
-            part.append(thinned(whole.isel(geometry=np.flatnonzero(chosen)), count))
-    return found
+    wavelengths = np.unique(whole["wavelength"].values)
+
+    def of(wavelength: float, incidence: Sequence[int], count: int) -> xr.Dataset:
+        chosen = (whole["wavelength"].values == wavelength) & np.isin(groups, incidence) & low
+        return thinned(whole.isel(geometry=np.flatnonzero(chosen)), count)
+
+    known = [of(wavelength, LIBRARY_INCIDENCE, MANY) for wavelength in wavelengths]
+    return known, [[of(wavelength, [i], FEW) for i in TEST_INCIDENCE] for wavelength in wavelengths]
 
 
-def infrared(data: Path, material: str) -> tuple[list[xr.Dataset], list[xr.Dataset]]:
+def infrared(data: Path, material: str) -> tuple[list[xr.Dataset], list[list[xr.Dataset]]]:
     """Positions of the camera for the library (taken together) and to identify."""
     import pandas as pd
 
@@ -88,7 +89,7 @@ def infrared(data: Path, material: str) -> tuple[list[xr.Dataset], list[xr.Datas
             I=rows.f_r_per_sr.to_numpy(float),
         )
 
-    return [thinned(of(positions[::2]), MANY)], [thinned(of([p]), FEW) for p in positions[1::2]]
+    return [thinned(of(positions[::2]), MANY)], [[thinned(of([p]), FEW) for p in positions[1::2]]]
 
 
 def with_noise(data: xr.Dataset, relative: float, absolute: float) -> xr.Dataset:
@@ -134,10 +135,9 @@ def main() -> int:
     library = Library(tuple(material_from_fits(name, own) for name, own in fits.items()))
     calibration, test = [], []
     for name, (known, asked) in sources.items():
-        noisy = [(name, with_noise(one, *noise)) for one in asked]
-        turns = (noisy[1::3], noisy[2::3]) if len(known) > 1 else (noisy[::2], noisy[1::2])
-        calibration += turns[0]
-        test += turns[1]
+        turns = (asked[1::3], asked[2::3]) if len(known) > 1 else ([], asked)
+        for target, turn in zip((calibration, test), turns, strict=True):
+            target += [(name, with_noise(one, *noise)) for own in turn for one in own]
     rows: list[dict[str, Any]] = []
     for gain in (False, True):
         calibrated = calibrate_library(library, calibration, gain=gain)
@@ -151,7 +151,6 @@ def main() -> int:
                         "compared": "shape" if gain else "absolute",
                         "sets": title,
                         "material": name,
-                        "model": models[name],
                         "measurements": len(own),
                         "most probable": float(np.mean([f.candidates[0].name == name for f in own])),
                         "probability": float(np.mean([f[name].probability for f in own])),
@@ -164,12 +163,12 @@ def main() -> int:
                     }
                 )
     table = Table(box=SIMPLE_HEAD, padding=(0, 1))
-    words = ("compared", "sets", "material", "model")
+    words = ("compared", "sets", "material")
     for heading in rows[0]:
         table.add_column(heading, justify="left" if heading in words else "right")
     for row in rows:
         table.add_row(*(f"{v:.2f}" if isinstance(v, float) else str(v) for v in row.values()))
-    Console(width=170).print(table, highlight=False)
+    Console(width=150).print(table, highlight=False)
     if options.json is not None:
         options.json.write_text(json.dumps(rows, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
     return 0
