@@ -17,7 +17,7 @@ for a linear model it follows χ² with as many degrees of freedom as there are 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -37,6 +37,8 @@ __all__ = ["Evidence", "evidence", "linearised", "posterior"]
 GAIN_SPREAD = 3.0
 #: How far from its mean, in standard deviations, a specimen is looked for.
 REACH = 8.0
+#: A specimen farther than this from its mean is looked for again, starting no farther than that.
+FAR, NEAR = 5.0, 3.0
 
 
 @dataclass(frozen=True)
@@ -294,6 +296,36 @@ def _of_one_model(
     problem = Residuals(function, points, penalty)
     limit = np.full(unknowns, REACH)
     solution = solve(problem, start, -limit, limit, max_iterations=max_iterations, tolerance=1e-6)
+    far = (np.abs(solution.u[:, :size]) > FAR).any(axis=1)
+    if far.any():
+        solution = _from_nearby(problem, solution, start, far, limit, max_iterations)
     if not np.isfinite(solution.cost).all():
         raise FitError("the likelihood of a material is not finite: check the data's values and the library")
     return solution
+
+
+def _from_nearby(
+    problem: Residuals,
+    found: Solution,
+    start: np.ndarray,
+    far: np.ndarray,
+    limit: np.ndarray,
+    max_iterations: int,
+) -> Solution:
+    """The far lanes searched again, first among likely specimens and from their best one on; the better end counts.
+
+    A first long step past a lobe can end where nothing is left of it.
+    """
+    begin, reach = np.where(far[:, None], start, found.u), np.where(far, NEAR, 0.0)[:, None]
+    begin = solve(
+        problem, begin, begin - reach, begin + reach, max_iterations=max_iterations, tolerance=1e-6
+    ).u
+    low, high = np.where(far[:, None], -limit, begin), np.where(far[:, None], limit, begin)
+    again = solve(problem, begin, low, high, max_iterations=max_iterations, tolerance=1e-6)
+    better = far & (again.cost < found.cost)
+
+    def chosen(name: str) -> np.ndarray:
+        old, new = getattr(found, name), getattr(again, name)
+        return np.where(better.reshape(-1, *[1] * (old.ndim - 1)), new, old)
+
+    return Solution(*(chosen(f.name) for f in fields(Solution)))
