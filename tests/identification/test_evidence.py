@@ -140,3 +140,18 @@ def test_a_turned_sample_is_recognised_if_its_offset_is_allowed_for():
     materials = [bundled_library()["white"]]
     assert evidence(materials, [data]).distance[0, 0] > 25.0
     assert evidence(materials, [data], angle=offset).distance[0, 0] < 12.0
+
+
+@pytest.mark.parametrize("first", [2.87, 2.5, -2.5])
+def test_an_unusual_specimen_is_found_at_the_flank_of_a_lobe(first):
+    """A rough panel near grazing: a first step from the mean goes past the lobe, to where nothing of it is left."""
+    material = bundled_library()["cd-back"]
+    z = np.zeros(len(material.mean))
+    z[0] = first
+    model = material.space.build(material.space.to_parameters(material.mean + material.root @ z))
+    angles = [np.radians([40.0, 65.6]), np.radians([20.0, 79.4]), np.zeros(2)]
+    exact = model.stokes(*angles)[:, :3].T
+    std = np.broadcast_to(0.03 * exact[0], exact.shape)
+    data = Observations(*angles, ("I", "Q", "U"), exact, std, (1.0, 0.0, 0.0, 0.0), True)
+    # the true specimen costs |z|², the most likely one less
+    assert evidence([material], [data]).distance[0, 0] <= first**2 + 1e-6

@@ -91,3 +91,12 @@ def test_specimens_keep_within_the_domain():
     for values in drawn[:50]:
         bundled_library()["pearl-white"].space.build(values)
     assert np.isfinite(drawn).all()
+
+
+def test_bounds_are_those_that_the_options_allow():
+    """With the visible normalisation k ends above 1/3: every corner of the bounds is a model."""
+    paint = pbrdf.DoubleGauss(**pbrdf.load_paint("white").values, normalization="visible")
+    material = material_from_model("visible", paint)
+    place = material.space.names.index("k")
+    assert material.space.lower[place] > 1.0 / 3.0
+    material.space.build(material.space.lower)

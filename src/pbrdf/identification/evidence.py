@@ -17,7 +17,7 @@ for a linear model it follows χ² with as many degrees of freedom as there are 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -28,16 +28,18 @@ from pbrdf.errors import FitError
 from pbrdf.identification.material import Material
 from pbrdf.inversion.nuisance import KINDS
 from pbrdf.inversion.observations import Observations
-from pbrdf.inversion.problem import Term, misfits, predict
+from pbrdf.inversion.problem import Space, Term, derivatives, misfits, predict
 from pbrdf.inversion.solver import Residuals, Solution, solve
 from pbrdf.inversion.stack import Stack
 
-__all__ = ["Evidence", "evidence", "posterior"]
+__all__ = ["Evidence", "evidence", "linearised", "posterior"]
 
 #: A gain that is not known is log-normal about the best one, with so many e-folds: a factor of 20 either way.
 GAIN_SPREAD = 3.0
 #: How far from its mean, in standard deviations, a specimen is looked for.
 REACH = 8.0
+#: A specimen farther than this from its mean is looked for again, starting no farther than that.
+FAR, NEAR = 5.0, 3.0
 
 
 @dataclass(frozen=True)
@@ -120,20 +122,76 @@ def evidence(
 
 
 def posterior(
-    material: Material, data: Sequence[Observations], *, gain: bool = False, accuracy: str | None = None
+    material: Material,
+    data: Sequence[Observations],
+    *,
+    gain: bool = False,
+    angle: float | None = None,
+    accuracy: str | None = None,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
     """Mode and information of z for one material, and the logarithm of the gain about which z counts it.
+
+    Parameters as of :func:`evidence`.
 
     Returns
     -------
     z, information, centre
-        Shapes (B, Z), (B, Z, Z) and (B,), None where the gain is known. z holds the specimen's numbers and then the
-        gain's: ln g = centre + ``GAIN_SPREAD`` z.
+        Shapes (B, Z), (B, Z, Z) and (B,), None where the gain is known. z holds the specimen's numbers, then the
+        gain's (ln g = centre + ``GAIN_SPREAD`` z) and that of the sample's angle (δ = ``angle`` z).
     """
     factors = _best_gains([material], data) if gain else None
     centre = None if factors is None else factors.mean(axis=1)
-    solution = _of_one_model([material], data, factors, centre, None, accuracy, 50)
+    solution = _of_one_model([material], data, factors, centre, angle, accuracy, 50)
     return solution.u, solution.information, centre
+
+
+def linearised(
+    material: Material, z: np.ndarray, centre: float | None, angle: float | None, geometries: Observations
+) -> tuple[np.ndarray, np.ndarray]:
+    """Signals of one specimen at other geometries, and their derivatives with respect to z.
+
+    Parameters
+    ----------
+    material
+        The material.
+    z, centre, angle
+        Of one measurement, as :func:`posterior` has them, shape (Z,).
+    geometries
+        Where, with the channels and the illumination; its values are not looked at.
+
+    Returns
+    -------
+    values, jacobian
+        Shapes (G, C) and (G, C, Z).
+    """
+    size = len(material.mean)
+    nuisances = _nuisances(centre is not None, angle)
+    low, high = material.space.box
+    unbounded = material.mean + material.root @ z[:size]
+    scales = ([] if centre is None else [GAIN_SPREAD]) + ([] if angle is None else [angle])
+    offsets = ([] if centre is None else [centre]) + ([] if angle is None else [0.0])
+    u = np.concatenate([np.clip(unbounded, low, high), offsets + scales * z[size:]])
+    along = np.zeros((len(u), len(z)))
+    along[:size, :size] = material.root * ((unbounded > low) & (unbounded < high))[:, None]
+    along[size:, size:] = np.diag(scales)
+    space = _with_nuisances(material.space, nuisances)
+    values, jacobian = derivatives(space, u[None], geometries, geometries.channels)
+    return values[0], jacobian[0] @ along
+
+
+def _nuisances(gain: bool, angle: float | None) -> list[str]:
+    """Kinds of what the instrument adds, in the order of their places in z."""
+    return (["gain"] if gain else []) + ([] if angle is None else ["angle"])
+
+
+def _with_nuisances(space: Space, kinds: Sequence[str]) -> Space:
+    return replace(
+        space,
+        free=(*space.free, *(KINDS[kind] for kind in kinds)),
+        lower=np.append(space.lower, [KINDS[kind].lower for kind in kinds]),
+        upper=np.append(space.upper, [KINDS[kind].upper for kind in kinds]),
+        terms=(*space.terms, *(Term(kind, nuisance=True) for kind in kinds)),
+    )
 
 
 def _alike(materials: Sequence[Material]) -> list[list[int]]:
@@ -184,14 +242,8 @@ def _of_one_model(
     batch, count = len(data), len(materials)
     space = materials[0].space
     size = len(space.free)
-    nuisances = (["gain"] if start_gain is not None else []) + ([] if angle is None else ["angle"])
-    space = replace(
-        space,
-        free=(*space.free, *(KINDS[kind] for kind in nuisances)),
-        lower=np.append(space.lower, [KINDS[kind].lower for kind in nuisances]),
-        upper=np.append(space.upper, [KINDS[kind].upper for kind in nuisances]),
-        terms=(*space.terms, *(Term(kind, nuisance=True) for kind in nuisances)),
-    )
+    nuisances = _nuisances(start_gain is not None, angle)
+    space = _with_nuisances(space, nuisances)
     stack = Stack.of(data)
     misfit = misfits(space, stack, accuracy, Float)
     low, high = materials[0].space.box
@@ -235,6 +287,36 @@ def _of_one_model(
     problem = Residuals(function, stack.points, penalty)
     limit = np.full(unknowns, REACH)
     solution = solve(problem, start, -limit, limit, max_iterations=max_iterations, tolerance=1e-6)
+    far = (np.abs(solution.u[:, :size]) > FAR).any(axis=1)
+    if far.any():
+        solution = _from_nearby(problem, solution, start, far, limit, max_iterations)
     if not np.isfinite(solution.cost).all():
         raise FitError("the likelihood of a material is not finite: check the data's values and the library")
     return solution
+
+
+def _from_nearby(
+    problem: Residuals,
+    found: Solution,
+    start: np.ndarray,
+    far: np.ndarray,
+    limit: np.ndarray,
+    max_iterations: int,
+) -> Solution:
+    """The far lanes searched again, first among likely specimens and from their best one on; the better end counts.
+
+    A first long step past a lobe can end where nothing is left of it.
+    """
+    begin, reach = np.where(far[:, None], start, found.u), np.where(far, NEAR, 0.0)[:, None]
+    begin = solve(
+        problem, begin, begin - reach, begin + reach, max_iterations=max_iterations, tolerance=1e-6
+    ).u
+    low, high = np.where(far[:, None], -limit, begin), np.where(far[:, None], limit, begin)
+    again = solve(problem, begin, low, high, max_iterations=max_iterations, tolerance=1e-6)
+    better = far & (again.cost < found.cost)
+
+    def chosen(name: str) -> np.ndarray:
+        old, new = getattr(found, name), getattr(again, name)
+        return np.where(better.reshape(-1, *[1] * (old.ndim - 1)), new, old)
+
+    return Solution(*(chosen(f.name) for f in fields(Solution)))

@@ -27,6 +27,7 @@ __all__ = [
     "calibrate_library",
     "check_request",
     "identify",
+    "identify_observations",
     "shares",
     "unknown_gain",
 ]
@@ -87,6 +88,8 @@ class Identification:
         The measurement as it was compared.
     library
         The library.
+    temperature
+        What logarithms of likelihoods were divided by.
     """
 
     candidates: tuple[Candidate, ...]
@@ -98,6 +101,7 @@ class Identification:
     calibration: str
     data: Observations = field(repr=False)
     library: Library = field(repr=False)
+    temperature: float = 1.0
 
     @property
     def materials(self) -> list[str]:
@@ -165,12 +169,34 @@ def identify(
         If the library is empty, an option is none, or the data are not valid.
     """
     validate(dataset)
-    check_request(library, confidence)
     if isinstance(noise, str):
         noise = parse_noise(noise)
     observed = Observations.from_dataset(dataset, noise)
-    if gain is None:
-        gain = unknown_gain(dataset)
+    return identify_observations(
+        observed,
+        library,
+        confidence=confidence,
+        gain=unknown_gain(dataset) if gain is None else gain,
+        angle=angle,
+        noise="stated" if noise is not None else "of the data set" if observed.std_known else "assumed",
+        prior=prior,
+        calibration=calibration,
+    )
+
+
+def identify_observations(
+    observed: Observations,
+    library: Library,
+    *,
+    confidence: float,
+    gain: bool,
+    angle: float | None,
+    noise: str,
+    prior: Mapping[str, float] | None,
+    calibration: Calibration | None,
+) -> Identification:
+    """Identify the material of plain arrays; ``noise`` in words, all else as for :func:`identify`."""
+    check_request(library, confidence)
     gain = gain and not all(is_ratio(channel) for channel in observed.channels)
     found = evidence(library.materials, [observed], gain=gain, angle=angle)
     used = calibration or library.calibration
@@ -183,10 +209,11 @@ def identify(
         degrees_of_freedom=int(found.degrees_of_freedom[0]),
         gain=gain,
         angle=angle,
-        noise="stated" if noise is not None else "of the data set" if observed.std_known else "assumed",
+        noise=noise,
         calibration=words,
         data=observed,
         library=library,
+        temperature=1.0 if used is None else used.temperature,
     )
 
 

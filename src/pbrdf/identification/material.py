@@ -300,7 +300,9 @@ def _space(
     """The bounds of a fit hold specimens too, widened to hold the mean; an amplitude is on the data's own scale."""
     lower, upper = [], []
     for p, value in zip(free, values, strict=True):
-        low, high = (value / _AMPLITUDES, value * _AMPLITUDES) if p.amplitude else (p.lower, p.upper)
+        low, high = model.fit_bounds(p, options)
+        if p.amplitude:
+            low, high = value / _AMPLITUDES, value * _AMPLITUDES
         lower.append(max(min(low, value), p.domain[0]))
         upper.append(min(max(high, value), p.domain[1]))
     return Space(model, dict(options), free, dict(fixed), np.array(lower), np.array(upper))
