@@ -27,7 +27,9 @@ from pbrdf.cli.convert import convert
 from pbrdf.cli.doctor import doctor
 from pbrdf.cli.export import export
 from pbrdf.cli.fit import fit
+from pbrdf.cli.identify import identify
 from pbrdf.cli.interrupt import INTERRUPTED, end, heard_at_once
+from pbrdf.cli.library import library
 from pbrdf.cli.lists import models, paints
 from pbrdf.cli.measure import measure
 from pbrdf.cli.options import ReadingCommand
@@ -143,6 +145,8 @@ app.command()(polarimeter)
 app.command()(reduce)
 app.command(cls=ReadingCommand)(plot)
 app.command()(plan)
+app.command(cls=ReadingCommand)(identify)
+app.add_typer(library, name="library")
 app.command()(measure)
 app.command()(render)
 app.command()(reproduce)
