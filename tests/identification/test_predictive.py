@@ -7,7 +7,7 @@ import pytest
 
 import pbrdf
 from pbrdf.identification.library import bundled_library
-from pbrdf.identification.predictive import best_gains, specimens_shown
+from pbrdf.identification.predictive import specimens_shown, typical_gains
 from pbrdf.inversion.observations import Observations
 
 WHITE = bundled_library()["white"]
@@ -33,7 +33,7 @@ def test_the_gain_that_made_the_data_is_found(observed):
     shown = specimens_shown(WHITE, values[None], observed, observed.channels)
     measured = np.stack([3.5 * shown[name][0] for name in observed.channels])
     made = Observations(**{**vars(observed), "values": measured})
-    assert best_gains(WHITE, values[None], made) == pytest.approx([3.5])
+    assert typical_gains(WHITE, values[None], made) == pytest.approx([3.5])
 
 
 def test_no_geometry_no_values(observed):

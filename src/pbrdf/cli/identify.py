@@ -364,7 +364,7 @@ def _with_option(text: str, library: str) -> str:
     return (
         f"{library}: {text}"
         if text.startswith("the library has no material:")
-        else f"--prior: {library}: {text}"
+        else f"--prior: {text} ({library})"
     )
 
 

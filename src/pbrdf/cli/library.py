@@ -159,11 +159,12 @@ def remove(
 
     known = read_library(library)
     changed = known
-    for name in names:
-        try:
-            changed = changed.without(name)
-        except FitError as error:
-            raise FitError(f"{library}: {error}") from error
+    try:
+        gone = [known[name].name for name in dict.fromkeys(names)]
+    except FitError as error:
+        raise FitError(f"{library}: {error}") from error
+    for name in gone:
+        changed = changed.without(name)
     changed.write(library)
     _say_written(library, len(changed.materials), known.calibration is not None)
 

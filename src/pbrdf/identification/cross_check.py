@@ -90,12 +90,7 @@ def cross_checked(
     probability, p_value = np.empty_like(log_evidence), np.empty_like(scores)
     for number in np.unique(fold):
         own, others = fold == number, fold != number
-        if not others.any():
-            calibration = calibrate(names, log_evidence[:0], scores[:0], truth[:0])
-            temperature = 1.0
-        else:
-            calibration = calibrate(names, log_evidence[others], scores[others], truth[others])
-            temperature = calibration.temperature
-        probability[own] = probabilities(log_evidence[own], None, temperature)
+        calibration = calibrate(names, log_evidence[others], scores[others], truth[others])
+        probability[own] = probabilities(log_evidence[own], None, calibration.temperature)
         p_value[own] = calibration.p_values(scores[own])
     return Judged(tuple(names), truth, probability, p_value)

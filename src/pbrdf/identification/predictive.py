@@ -7,12 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from pbrdf.backend import get_backend
-from pbrdf.data.schema import is_ratio
 from pbrdf.identification.material import Material
 from pbrdf.inversion.observations import Observations
 from pbrdf.inversion.problem import signals_of
 
-__all__ = ["best_gains", "specimens_shown"]
+__all__ = ["specimens_shown", "typical_gains"]
 
 
 def specimens_shown(
@@ -53,16 +52,17 @@ def specimens_shown(
     return {name: array.numpy().reshape(count, size) for name, array in zip(channels, arrays, strict=True)}
 
 
-def best_gains(material: Material, parameters: np.ndarray, data: Observations) -> np.ndarray:
-    """Factor of the intensities by which each of S specimens fits a measurement best, shape (S,); 1 for ratios."""
-    rows = [c for c, name in enumerate(data.channels) if not is_ratio(name)]
-    if not rows:
+def typical_gains(material: Material, parameters: np.ndarray, data: Observations) -> np.ndarray:
+    """Factor that brings each of S specimens to the scale of a measurement, shape (S,); 1 where no intensity is measured.
+
+    It is the median of the ratios of measured and modelled intensity: a peak that differs does not pull the rest along.
+    """
+    name = next((n for n in ("I", "m00") if n in data.channels), None)
+    if name is None:
         return np.ones(len(parameters))
-    names = [data.channels[c] for c in rows]
-    modelled = specimens_shown(material, parameters, data, names)
-    along, square = np.zeros(len(parameters)), np.zeros(len(parameters))
-    for c, name in zip(rows, names, strict=True):
-        weights = 1.0 / data.std[c] ** 2
-        along += (weights * data.values[c] * modelled[name]).sum(axis=1)
-        square += (weights * modelled[name] ** 2).sum(axis=1)
-    return np.maximum(along / square, 1e-12)
+    c = data.channels.index(name)
+    there = np.isfinite(data.std[c]) & (data.values[c] > 0.0)
+    if not there.any():
+        return np.ones(len(parameters))
+    modelled = specimens_shown(material, parameters, data, [name])[name][:, there]
+    return np.asarray(np.median(data.values[c][there] / np.maximum(modelled, 1e-300), axis=1))

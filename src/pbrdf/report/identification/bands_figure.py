@@ -1,7 +1,7 @@
 """Figure of a measurement over what the specimens of each candidate would show.
 
 A band holds the middle 95 % of the specimens that are drawn from a material, at each geometry by itself; where the gain
-is not known, each specimen has the gain with which it fits the data best. The line is the specimen that the measurement
+is not known, each specimen is scaled to the data by the median of their ratios. The line is the specimen that the measurement
 makes most likely. Where the geometries lie on no few lines of the plane of incidence they stand side by side.
 """
 
@@ -13,7 +13,7 @@ import numpy as np
 
 from pbrdf.identification.identify import Candidate
 from pbrdf.identification.material import Material
-from pbrdf.identification.predictive import best_gains, specimens_shown
+from pbrdf.identification.predictive import specimens_shown, typical_gains
 from pbrdf.inversion.observations import Observations
 from pbrdf.report.dataset.cuts import Cut
 from pbrdf.report.dataset.describe import short_name
@@ -127,7 +127,7 @@ def _bands(
     parameters = np.concatenate([likely, drawn])
     shown = _quantities(material, parameters, at, names)
     if report.found.gain:
-        gains = best_gains(material, parameters, report.found.data)
+        gains = typical_gains(material, parameters, report.found.data)
         shown = {n: v * gains[:, None] if is_intensity(n) else v for n, v in shown.items()}
     ends = 0.5 * (1.0 - PART), 0.5 * (1.0 + PART)
     return {n: (*np.quantile(v[1:], ends, axis=0), v[0]) for n, v in shown.items()}
@@ -205,7 +205,7 @@ def _handles(shown: ShownCuts, report: Identified) -> list[Any]:
     if len(shown.cuts) < shown.found:
         handles[-1].set_label(f"{handles[-1].get_label()} ({len(shown.cuts)} of {shown.found} curves drawn)")
     colour = GREY if shown.cuts else BLUE
-    best = " (best gain each)" if report.found.gain else ""
+    best = " (scaled to the data)" if report.found.gain else ""
     handles.append(Line2D([], [], color="black", marker="o", linestyle="none", label="points: measured"))
     handles.append(Patch(color=colour, alpha=0.3, linewidth=0, label=f"95 % of specimens{best}"))
     handles.append(Line2D([], [], color=colour, label="most likely specimen"))

@@ -30,7 +30,7 @@ _CAPTIONS = {
     "bands": (
         "The measurement over what specimens of each candidate would show.",
         "Points: measured, bars one standard uncertainty. Bands: the middle 95 % of the specimens that the library "
-        "expects of a material, at each geometry by itself; where the gain is not known, each at its best gain. Lines: "
+        "expects of a material, at each geometry by itself; where the gain is not known, each scaled to the data. Lines: "
         "the specimen that this measurement makes most likely. The last column is the nearest material outside the "
         "set, if there is one.",
     ),
@@ -119,13 +119,13 @@ def write_classes(report: Classified, directory: Path, *, figure_format: str | N
         "library": report.library,
         "classes": [
             {
-                "value": c.value,
-                "class": c.name,
-                "pixels": c.pixels,
-                "share": c.share,
-                "median_probability": c.confidence,
+                "value": count.value,
+                "class": count.name,
+                "pixels": count.pixels,
+                "share": count.share,
+                "median_probability": count.confidence,
             }
-            for c in report.counts
+            for count in report.counts
         ],
         "rests_on": classes_rest_on(report),
     }

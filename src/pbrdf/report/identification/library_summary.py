@@ -89,7 +89,7 @@ def _material(material: Material) -> Iterator[RenderableType]:
             brief(factor * value),
             brief(factor * std, 2),
             per_cent(std / abs(value)) if value else "–",
-            unit,
+            "" if unit == "1" else unit,
         )
     table.title = None
     yield table
