@@ -53,7 +53,7 @@ def specimens_shown(
 
 
 def typical_gains(material: Material, parameters: np.ndarray, data: Observations) -> np.ndarray:
-    """Factor that brings each of S specimens to the scale of a measurement, shape (S,); 1 where no intensity is measured.
+    """Factor that brings each of S specimens to the scale of a measurement, shape (S,); 1 for ratios.
 
     It is the median of the ratios of measured and modelled intensity: a peak that differs does not pull the rest along.
     """

@@ -1,8 +1,8 @@
 """Figure of a measurement over what the specimens of each candidate would show.
 
 A band holds the middle 95 % of the specimens that are drawn from a material, at each geometry by itself; where the gain
-is not known, each specimen is scaled to the data by the median of their ratios. The line is the specimen that the measurement
-makes most likely. Where the geometries lie on no few lines of the plane of incidence they stand side by side.
+is not known, each specimen is scaled to the data by the median of their ratios. The line is the specimen that the
+measurement makes most likely. Geometries that lie on no few lines of the plane of incidence stand side by side.
 """
 
 from __future__ import annotations

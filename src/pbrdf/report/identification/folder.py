@@ -30,9 +30,9 @@ _CAPTIONS = {
     "bands": (
         "The measurement over what specimens of each candidate would show.",
         "Points: measured, bars one standard uncertainty. Bands: the middle 95 % of the specimens that the library "
-        "expects of a material, at each geometry by itself; where the gain is not known, each scaled to the data. Lines: "
-        "the specimen that this measurement makes most likely. The last column is the nearest material outside the "
-        "set, if there is one.",
+        "expects of a material, at each geometry by itself; where the gain is not known, each scaled to the data. "
+        "Lines: the specimen that this measurement makes most likely. The last column is the nearest material outside "
+        "the set, if there is one.",
     ),
     "classes": (
         "The material of each pixel and its probability.",
