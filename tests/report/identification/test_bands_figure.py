@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from figure_helpers import legend, lines
 
 from pbrdf.report.identification.bands_figure import bands_figure, shown_candidates
@@ -13,8 +14,9 @@ def titles(figure):
     return [ax.get_title().split("\n")[0] for ax in figure.axes if ax.get_title()]
 
 
+@pytest.mark.slow
 def test_a_column_for_each_of_the_set_and_the_nearest_outside(identified, scattered):
-    assert [c.name for c in shown_candidates(identified)][0] == "white"
+    assert shown_candidates(identified)[0].name == "white"
     figure = bands_figure(identified)
     assert titles(figure) == ["white: in the set", f"{shown_candidates(identified)[1].name}: not in the set"]
     assert len(figure.axes) == 4  # intensity and degree of polarisation
@@ -38,6 +40,7 @@ def test_the_likely_specimen_and_the_band_go_through_the_data(identified):
         assert np.median(np.abs(np.asarray(measured.get_ydata()) / at - 1.0)) < 0.05
 
 
+@pytest.mark.slow
 def test_geometries_on_no_curve_stand_side_by_side(scattered, tmp_path):
     figure = bands_figure(scattered)
     ax = figure.axes[0]

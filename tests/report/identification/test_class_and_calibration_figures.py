@@ -100,6 +100,7 @@ def test_many_materials_a_line_and_a_large_map():
     assert legend(large)[0] == "white: 4500 (100 %)"
 
 
+@pytest.mark.slow
 def test_the_folder_of_a_map(picture, tmp_path):
     report = Classified(picture, "map.nc", LIBRARY, "the bundled paints", True, {"white": 0.5})
     files = write_classes(report, tmp_path / "out")
@@ -138,6 +139,7 @@ def test_confusion(calibrated):
     assert [t.get_text() for t in ax.get_xticklabels()] == [*LIBRARY.names, "none of these"]
 
 
+@pytest.mark.slow
 def test_the_folder_of_a_calibration(calibrated, tmp_path):
     files = write_calibration(calibrated, tmp_path / "out", with_library=True, figure_format="svg")
     assert [f.name for f in files] == [
