@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -166,33 +167,49 @@ def identify(
     }
     if output is not None and figures:
         leave_out_help_texts()
-    drawn = figure_format if figures else None
+    request = _Request(
+        opened,
+        name,
+        reading,
+        confidence,
+        asked,
+        common,
+        smoothing,
+        settings,
+        figure_format if figures else None,
+        quiet,
+    )
     if calibrate is not None:
-        _calibrate(calibrate, opened, library, confidence, asked, settings, reading, output, drawn, quiet)
+        _calibrate(request, calibrate, library, output)
         return
-    asked |= {"confidence": confidence, "prior": common}
     for number, source in enumerate(sources):
-        folder = folders[number] if folders else None
+        into = folders[number] if folders else None
         if number and not quiet:
             print()
         pixels = open_pixels(source)
-        work = _one if pixels is None else _every_pixel
-        work(source, pixels, opened, name, asked, smoothing, settings, reading, folder, drawn, quiet)
+        if pixels is None:
+            _one(request, source, into)
+        else:
+            _every_pixel(request, source, pixels, into)
 
 
-def _one(
-    source: str,
-    pixels: None,
-    library: Library,
-    name: str,
-    asked: dict[str, Any],
-    smoothing: float,
-    settings: dict[str, Any],
-    reading: Reading,
-    folder: Path | None,
-    drawn: str | None,
-    quiet: bool,
-) -> None:
+@dataclass(frozen=True)
+class _Request:
+    """What the options ask for: the library and its name, how to read, what identification is told, what is written."""
+
+    library: Library
+    name: str
+    reading: Reading
+    confidence: float
+    asked: dict[str, Any]
+    prior: dict[str, float]
+    smoothing: float
+    settings: dict[str, Any]
+    drawn: str | None
+    quiet: bool
+
+
+def _one(request: _Request, source: str, folder: Path | None) -> None:
     """Identify one measurement."""
     from pbrdf.files.digest import sha256_of
     from pbrdf.identification.identify import identify as identify_dataset
@@ -200,35 +217,32 @@ def _one(
     from pbrdf.report.identification.subject import Identified
     from pbrdf.report.identification.summary import print_summary
 
-    if smoothing:
+    if request.smoothing:
         raise PbrdfError(f"--smoothing is for maps, and {source} is one measurement: leave it out")
-    measured = open_measurement(source, reading)
-    found = _told(source, lambda: identify_dataset(measured.dataset, library, **asked))
+    measured = open_measurement(source, request.reading)
+    found = _told(
+        source,
+        lambda: identify_dataset(
+            measured.dataset,
+            request.library,
+            confidence=request.confidence,
+            prior=request.prior,
+            **request.asked,
+        ),
+    )
     digest = sha256_of(Path(source)) if measured.fit is None else ""
     report = Identified(
-        found, measured.dataset, source, name, asked["prior"], settings, command_line(), digest
+        found, measured.dataset, source, request.name, request.prior, request.settings, command_line(), digest
     )
-    written = [] if folder is None else write_identification(report, folder, figure_format=drawn)
-    if quiet:
+    written = [] if folder is None else write_identification(report, folder, figure_format=request.drawn)
+    if request.quiet:
         print(f"{source}: {', '.join(found.materials) or 'none of these'}")
         return
     print_summary(report, output_console())
     _say_written(folder, written)
 
 
-def _every_pixel(
-    source: str,
-    pixels: xr.Dataset,
-    library: Library,
-    name: str,
-    asked: dict[str, Any],
-    smoothing: float,
-    settings: dict[str, Any],
-    reading: Reading,
-    folder: Path | None,
-    drawn: str | None,
-    quiet: bool,
-) -> None:
+def _every_pixel(request: _Request, source: str, pixels: xr.Dataset, folder: Path | None) -> None:
     """Identify every pixel of a map."""
     from pbrdf.identification.class_map import identify_map
     from pbrdf.identification.identify import unknown_gain
@@ -236,25 +250,37 @@ def _every_pixel(
     from pbrdf.report.identification.folder import write_classes
     from pbrdf.report.identification.summary import print_classes
 
-    if given := reading.stated():
+    gain, noise = request.asked["gain"], request.asked["noise"]
+    if given := request.reading.stated():
         options = ", ".join("--" + option.replace("_", "-") for option in given)
         raise DataError(f"{source} is a map, which needs no {options}: leave it out")
-    if asked["angle"] is not None:
+    if request.asked["angle"] is not None:
         raise PbrdfError(f"--angle: {source} is a map, whose angles count as exact: leave it out")
     fitted = "estimate" in pixels
-    if fitted and (asked["gain"] is not None or asked["noise"] is not None):
+    if fitted and not (gain is None and noise is None):
         raise PbrdfError(
             f"--gain and --noise: {source} holds fitted parameters, which need neither: leave them out"
         )
-    options = {key: value for key, value in asked.items() if key != "angle"}
-    with progress_bar(f"Identifying the pixels of {source}", quiet) as progress:
+    with progress_bar(f"Identifying the pixels of {source}", request.quiet) as progress:
         found = _told(
-            source, lambda: identify_map(pixels, library, smoothing=smoothing, progress=progress, **options)
+            source,
+            lambda: identify_map(
+                pixels,
+                request.library,
+                confidence=request.confidence,
+                gain=gain,
+                noise=noise,
+                prior=request.prior,
+                smoothing=request.smoothing,
+                progress=progress,
+            ),
         )
-    free = None if fitted else unknown_gain(pixels) if asked["gain"] is None else asked["gain"]
-    report = Classified(found, source, library, name, free, asked["prior"], settings, command_line())
-    written = [] if folder is None else write_classes(report, folder, figure_format=drawn)
-    if quiet:
+    free = None if fitted else unknown_gain(pixels) if gain is None else gain
+    report = Classified(
+        found, source, request.library, request.name, free, request.prior, request.settings, command_line()
+    )
+    written = [] if folder is None else write_classes(report, folder, figure_format=request.drawn)
+    if request.quiet:
         print(folder if folder is not None else f"{source}: {_largest(report)}")
         return
     print_classes(report, output_console())
@@ -269,18 +295,7 @@ def _largest(report: Any) -> str:
     return ", ".join(count.name for count in seen) or "none of these"
 
 
-def _calibrate(
-    table: Path,
-    library: Library,
-    file: Path | None,
-    confidence: float,
-    asked: dict[str, Any],
-    settings: dict[str, Any],
-    reading: Reading,
-    output: Path | None,
-    drawn: str | None,
-    quiet: bool,
-) -> None:
+def _calibrate(request: _Request, table: Path, file: Path | None, output: Path | None) -> None:
     """Calibrate a library, and report how honest it is."""
     from pbrdf.files.atomic import require_writable_folder
     from pbrdf.identification.conformal import calibrate
@@ -291,21 +306,26 @@ def _calibrate(
     from pbrdf.report.identification.folder import LIBRARY, write_calibration
     from pbrdf.report.identification.summary import print_calibration
 
+    library = request.library
     folder = output or Path(f"{table.stem}-calibration")
     require_writable_folder(folder)
-    target = file if file is not None and output is None else folder / LIBRARY
-    labelled = _labelled(table, library, reading)
-    with progress_bar(f"Calibrating with {table}", quiet) as progress:
-        evidence = _told(str(table), lambda: labelled_evidence(library, labelled, progress=progress, **asked))
-    calibration = calibrate(library.names, *evidence, f"{len(labelled)} of {table.name}")
-    judged = cross_checked(library.names, *evidence)
-    made = Library(library.materials, calibration)
-    report = Calibrated(made, judged, confidence, str(table), str(target), settings, command_line())
-    within = target == folder / LIBRARY
-    written = write_calibration(report, folder, figure_format=drawn, with_library=within)
+    within = file is None or output is not None
+    target = folder / LIBRARY if file is None or within else file
+    labelled = _labelled(table, library, request.reading)
+    with progress_bar(f"Calibrating with {table}", request.quiet) as progress:
+        rows, scores, truth = _told(
+            str(table), lambda: labelled_evidence(library, labelled, progress=progress, **request.asked)
+        )
+    words = f"{len(labelled)} of {table.name}"
+    made = Library(library.materials, calibrate(library.names, rows, scores, truth, words))
+    judged = cross_checked(library.names, rows, scores, truth)
+    report = Calibrated(
+        made, judged, request.confidence, str(table), str(target), request.settings, command_line()
+    )
+    written = write_calibration(report, folder, figure_format=request.drawn, with_library=within)
     if not within:
         made.write(target)
-    if quiet:
+    if request.quiet:
         print(target)
         return
     print_calibration(report, output_console())

@@ -107,14 +107,15 @@ def _few(cuts: list[Cut]) -> list[Cut]:
 def _along(report: Identified, cuts: list[Cut]) -> Observations:
     """Geometries at which specimens are shown: along the cuts, or the measured ones."""
     data = report.found.data
+    theta_i, theta_r, phi = data.theta_i, data.theta_r, data.phi
     if cuts:
-        angles = [np.concatenate(a) for a in zip(*(cut.path_angles() for cut in cuts), strict=True)]
-        there = np.isfinite(angles[0])
-        angles = [a[there] for a in angles]
-    else:
-        angles = [data.theta_i, data.theta_r, data.phi]
-    nothing = np.empty((0, len(angles[0])))
-    return Observations(*angles, (), nothing, nothing, data.illumination, False)
+        theta_i, theta_r, phi = (
+            np.concatenate(a) for a in zip(*(cut.path_angles() for cut in cuts), strict=True)
+        )
+        there = np.isfinite(theta_i)
+        theta_i, theta_r, phi = theta_i[there], theta_r[there], phi[there]
+    nothing = np.empty((0, len(theta_i)))
+    return Observations(theta_i, theta_r, phi, (), nothing, nothing, data.illumination, False)
 
 
 def _bands(
@@ -166,7 +167,7 @@ def _side_by_side(ax: Axes, band: tuple[np.ndarray, ...], measured: np.ndarray, 
         place, measured, yerr=std if np.isfinite(std).any() else None, fmt="o", color="black", markersize=4.0,
         elinewidth=0.9, label="measured", zorder=4,
     )  # fmt: skip
-    ax.xaxis.get_major_locator().set_params(integer=True)
+    ax.locator_params(axis="x", integer=True)
     ax.set_xlim(0.4, measured.size + 0.6)
     ax.set_xlabel("number of the geometry", fontsize=8.5)
 

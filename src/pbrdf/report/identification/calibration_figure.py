@@ -49,7 +49,7 @@ def reliability_figure(judged: Judged, title: str) -> Figure:
         )
         lower.set_ylabel("measurements")
         lower.set_xlabel("probability of the most probable material")
-        lower.yaxis.get_major_locator().set_params(integer=True)
+        lower.locator_params(axis="y", integer=True)
         figure.suptitle(title)
     return figure
 
