@@ -277,7 +277,15 @@ def _every_pixel(request: _Request, source: str, pixels: xr.Dataset, folder: Pat
         )
     free = None if fitted else unknown_gain(pixels) if gain is None else gain
     report = Classified(
-        found, source, request.library, request.name, free, request.prior, request.settings, command_line()
+        found,
+        source,
+        request.library,
+        request.name,
+        free,
+        bool(pixels.attrs.get("simulated")),
+        request.prior,
+        request.settings,
+        command_line(),
     )
     written = [] if folder is None else write_classes(report, folder, figure_format=request.drawn)
     if request.quiet:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,7 +14,12 @@ from matplotlib.colors import to_hex
 from pbrdf.identification.conformal import calibrate
 from pbrdf.identification.cross_check import cross_checked
 from pbrdf.identification.library import Library, bundled_library
-from pbrdf.report.identification.calibrated import Calibrated, calibration_rests_on, fewest_needed
+from pbrdf.report.identification.calibrated import (
+    Calibrated,
+    calibration_rests_on,
+    fewest_needed,
+    level_of_calibration,
+)
 from pbrdf.report.identification.calibration_figure import confusion_figure, reliability_figure
 from pbrdf.report.identification.class_figure import class_counts, class_figure
 from pbrdf.report.identification.classified import Classified, classes_sentence
@@ -102,7 +108,7 @@ def test_many_materials_a_line_and_a_large_map():
 
 @pytest.mark.slow
 def test_the_folder_of_a_map(picture, tmp_path):
-    report = Classified(picture, "map.nc", LIBRARY, "the bundled paints", True, {"white": 0.5})
+    report = Classified(picture, "map.nc", LIBRARY, "the bundled paints", True, True, {"white": 0.5})
     files = write_classes(report, tmp_path / "out")
     assert [f.name for f in files] == [
         "index.html",
@@ -117,6 +123,8 @@ def test_the_folder_of_a_map(picture, tmp_path):
     page = files[0].read_text(encoding="utf-8")
     assert "which material is where?" in page
     assert "a common factor of each pixel" in page
+    assert "Simulated data, not measured." in page
+    assert "white 50 %, the others share the rest" in page
 
 
 def test_reliability(calibrated):
@@ -156,3 +164,10 @@ def test_few_measurements_exclude_nothing(calibrated):
     assert fewest_needed(0.9) == 9
     assert not any("Too few" in line for line in calibration_rests_on(calibrated))
     assert calibrated.library.calibration.p_values(np.zeros((1, 5))).max() <= 1.0 / 31.0 + 1e-12
+
+
+def test_a_promise_that_is_not_kept_shows(calibrated):
+    assert level_of_calibration(calibrated) == "describes"
+    judged = calibrated.judged
+    broken = replace(judged, p_value=np.where(np.arange(150)[:, None] % 8 == 0, 0.01, judged.p_value))
+    assert level_of_calibration(replace(calibrated, judged=broken)) == "not"

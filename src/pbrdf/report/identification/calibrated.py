@@ -21,6 +21,7 @@ __all__ = [
     "calibration_rests_on",
     "calibration_rows",
     "fewest_needed",
+    "level_of_calibration",
 ]
 
 CALIBRATION_HEADINGS = ("material", "measurements", "told as itself", "as another", "as none", "in the set")
@@ -55,14 +56,26 @@ class Calibrated:
     command: str = ""
 
 
+def _held(report: Calibrated) -> float:
+    """Part of the sets that hold the true material."""
+    judged = report.judged
+    return float(
+        (judged.p_value[np.arange(len(judged.truth)), judged.truth] > 1.0 - report.confidence).mean()
+    )
+
+
+def level_of_calibration(report: Calibrated) -> str:
+    """Whether sets held what they promise but for chance, in the words that give a verdict its colour."""
+    error = math.sqrt(report.confidence * (1.0 - report.confidence) / len(report.judged.truth))
+    return "describes" if _held(report) >= report.confidence - 2.0 * error else "not"
+
+
 def calibrated_sentence(report: Calibrated) -> str:
     """What the calibration is worth, in one sentence."""
     judged = report.judged
-    total = len(judged.truth)
-    held = judged.p_value[np.arange(total), judged.truth] > 1.0 - report.confidence
     return (
-        f"of {total} labelled measurements the {100.0 * report.confidence:g} % set held the true material for "
-        f"{100.0 * held.mean():.1f} %; the most probable was right for {100.0 * judged.accuracy:.1f} %; expected "
+        f"of {len(judged.truth)} labelled measurements the {100.0 * report.confidence:g} % set held the true material "
+        f"for {100.0 * _held(report):.1f} %; the most probable was right for {100.0 * judged.accuracy:.1f} %; expected "
         f"calibration error {judged.reliability.error:.3f}"
     )
 

@@ -42,6 +42,8 @@ class Classified:
         What to call the library.
     gain
         Whether each pixel's intensities were taken with a factor that is not known; None for a map of parameters.
+    simulated
+        Whether a model produced the data of the map.
     prior, settings, command
         As of :class:`pbrdf.report.identification.subject.Identified`.
     """
@@ -51,6 +53,7 @@ class Classified:
     materials: Library
     library: str
     gain: bool | None = None
+    simulated: bool = False
     prior: Mapping[str, float] = field(default_factory=dict)
     settings: Mapping[str, Any] = field(default_factory=dict)
     command: str = ""
@@ -106,6 +109,9 @@ def classes_rest_on(report: Classified) -> list[str]:
         )
     else:
         lines.append("Gain: known; the intensities count as absolute.")
+    if report.gain is not None:
+        stated = report.settings.get("noise") is not None
+        lines.append(f"Noise: {'stated' if stated else 'of the data, or assumed where these state none'}.")
     lines.append(prior_in_words(report.prior))
     smoothing = float(report.found.attrs.get("smoothing", 0.0))
     if smoothing:

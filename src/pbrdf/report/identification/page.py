@@ -16,6 +16,7 @@ from pbrdf.report.identification.calibrated import (
     calibrated_sentence,
     calibration_rests_on,
     calibration_rows,
+    level_of_calibration,
 )
 from pbrdf.report.identification.classified import (
     CLASS_HEADINGS,
@@ -108,6 +109,7 @@ def classes_page(report: Classified, figures: Mapping[str, Markup], files: Seque
             Section("What it rests on", [bullets(classes_rest_on(report))]),
             _repeat(report, files, [("Map", [report.name]), ("Library", [report.library])]),
         ],
+        banner="Simulated data, not measured." if report.simulated else "",
         verdict=_Verdict("describes" if without < 0.5 else "in part", classes_sentence(report)),
         footer=_footer(),
         navigation=True,
@@ -131,7 +133,7 @@ def calibration_page(report: Calibrated, figures: Mapping[str, Markup], files: S
             Section("What it rests on", [bullets(calibration_rests_on(report))]),
             _repeat(report, files, [("Labels", [report.name]), ("Calibrated library", [report.written])]),
         ],
-        verdict=_Verdict("in part", calibrated_sentence(report)),
+        verdict=_Verdict(level_of_calibration(report), calibrated_sentence(report)),
         footer=_footer(),
         navigation=True,
     )
