@@ -25,6 +25,10 @@ if TYPE_CHECKING:
     from pbrdf.data import check, make_dataset, read, validate, write
     from pbrdf.data.paints import PAINTS, load_paint, open_experiment
     from pbrdf.data.readers import register_reader
+    from pbrdf.identification.class_map import identify_map
+    from pbrdf.identification.identify import calibrate_library, identify
+    from pbrdf.identification.library import Library, bundled_library, read_library
+    from pbrdf.identification.material import material_from_fits, material_from_model
     from pbrdf.instruments.calibration.instrument_calibration import calibrate_instrument
     from pbrdf.instruments.goniometer.protocols import Protocol
     from pbrdf.instruments.pixel_geometry.geometries import as_geometries
@@ -132,6 +136,15 @@ _HOME = {
     "error_analysis": "pbrdf.inversion",
     "plausibility": "pbrdf.inversion",
     "directional_hemispherical_reflectance": "pbrdf.models.reflectance",
+    # which material it is
+    "identify": "pbrdf.identification.identify",
+    "identify_map": "pbrdf.identification.class_map",
+    "calibrate_library": "pbrdf.identification.identify",
+    "Library": "pbrdf.identification.library",
+    "read_library": "pbrdf.identification.library",
+    "bundled_library": "pbrdf.identification.library",
+    "material_from_fits": "pbrdf.identification.material",
+    "material_from_model": "pbrdf.identification.material",
     # polarimeters and their calibration
     "Instrument": "pbrdf.instruments.polarimeter.instrument",
     "load_instrument": "pbrdf.instruments.polarimeter.instrument_files",
@@ -179,6 +192,7 @@ __all__ = [
     "FitResult",
     "HoldOut",
     "Instrument",
+    "Library",
     "MapFit",
     "Model",
     "ModelError",
@@ -196,7 +210,9 @@ __all__ = [
     "as_geometries",
     "bootstrap",
     "bsdf_dict",
+    "bundled_library",
     "calibrate_instrument",
+    "calibrate_library",
     "check",
     "coherency_eigenvalues",
     "compare",
@@ -213,6 +229,8 @@ __all__ = [
     "get_backend",
     "goniometric_datasets",
     "identifiability",
+    "identify",
+    "identify_map",
     "lcvr",
     "load_fit",
     "load_instrument",
@@ -220,6 +238,8 @@ __all__ = [
     "load_paint",
     "make_dataset",
     "map_dataset",
+    "material_from_fits",
+    "material_from_model",
     "merit",
     "open_experiment",
     "open_map",
@@ -231,6 +251,7 @@ __all__ = [
     "profile",
     "read",
     "read_labels",
+    "read_library",
     "reduce",
     "reduce_frames",
     "register",

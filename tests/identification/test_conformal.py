@@ -84,3 +84,14 @@ def test_reliability_counts_every_measurement_once():
 def test_prior_probabilities_count():
     share = probabilities(np.array([[0.0, 0.0, 0.0]]), np.array([0.7, 0.3, 0.0]))
     assert share[0] == pytest.approx([0.7, 0.3, 0.0])
+
+
+def test_measurements_that_are_all_told_rightly_do_not_sharpen_the_likelihoods():
+    """They are most probable at the lowest temperature there is, and say nothing of it."""
+    truth = np.repeat([0, 1], 10)
+    log_evidence = np.where(truth[:, None] == [0, 1], 0.0, -40.0)
+    made = calibrate(("a", "b"), log_evidence, np.full((20, 2), 0.5), truth)
+    assert made.temperature == pytest.approx(1.0, abs=0.05)
+    assert calibrate(("a", "b"), log_evidence[:0], log_evidence[:0], truth[:0]).temperature == pytest.approx(
+        1.0, abs=0.05
+    )

@@ -45,6 +45,8 @@ COMMANDS = {
     "reduce": "reduce",
     "plot": "plot",
     "plan": "plan",
+    "identify": "identify",
+    "library": "library",
     "measure": "measure",
     "render": "render",
     "reproduce": "reproduce",
@@ -67,11 +69,14 @@ class _WhenCalled(Mapping[str, Any]):
         if name not in self._loaded:
             module, _, function_name = COMMANDS[name].partition(":")
             function = getattr(import_module(f"pbrdf.cli.{module}"), function_name or name)
-            alone = typer.Typer(
-                add_completion=False, rich_markup_mode="markdown", pretty_exceptions_enable=False
-            )
-            alone.command(name, cls=ReadingCommand)(function)
+            alone = function
+            if not isinstance(function, typer.Typer):
+                alone = typer.Typer(
+                    add_completion=False, rich_markup_mode="markdown", pretty_exceptions_enable=False
+                )
+                alone.command(name, cls=ReadingCommand)(function)
             self._loaded[name] = typer.main.get_command(alone)
+            self._loaded[name].name = name
         return self._loaded[name]
 
     def __contains__(self, name: object) -> bool:

@@ -54,7 +54,8 @@ def refuse_odd_numbers(commands: Mapping[str, Any], arguments: Sequence[str]) ->
     Parameters
     ----------
     commands
-        Commands by name; their options say by their annotation, or by the name of their type, that they are numbers.
+        Commands by name, or groups of them; their options say by their annotation, or by the name of their type, that
+        they are numbers.
     arguments
         Of the whole program.
 
@@ -64,6 +65,9 @@ def refuse_odd_numbers(commands: Mapping[str, Any], arguments: Sequence[str]) ->
         Names the option.
     """
     name = next((argument for argument in arguments if argument in commands), None)
+    if name is not None and (within := getattr(commands[name], "commands", None)):
+        refuse_odd_numbers(within, arguments[arguments.index(name) + 1 :])
+        return
     numeric = {
         option
         for parameter in (commands[name].params if name is not None else ())

@@ -30,6 +30,9 @@ __all__ = [
 
 #: Temperatures among which the one is taken that makes labelled measurements most probable.
 TEMPERATURES = np.exp(np.linspace(np.log(0.25), np.log(16.0), 61))
+#: How far the logarithm of the temperature may be off 0 before measurements have shown it: few measurements, or such
+#: that are all told rightly, would else make likelihoods as sharp as can be.
+TEMPERATURE_SPREAD = np.log(2.0)
 #: Classes of confidence for the reliability of probabilities.
 BINS = 10
 
@@ -109,6 +112,7 @@ def calibrate(
     rows = np.arange(len(truth))
     losses = [
         -np.log(np.maximum(probabilities(log_evidence, None, t)[rows, truth], 1e-300)).sum()
+        + 0.5 * (np.log(t) / TEMPERATURE_SPREAD) ** 2
         for t in TEMPERATURES
     ]
     best = float(TEMPERATURES[int(np.argmin(losses))])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -28,6 +28,7 @@ __all__ = [
     "check_request",
     "identify",
     "identify_observations",
+    "labelled_evidence",
     "shares",
     "unknown_gain",
 ]
@@ -244,21 +245,54 @@ def calibrate_library(
     FitError
         If a label is none of the library's materials, or there are no measurements.
     """
+    found = labelled_evidence(library, labelled, gain=gain, angle=angle, noise=noise)
+    return Library(library.materials, calibrate(library.names, *found, measurements))
+
+
+def labelled_evidence(
+    library: Library,
+    labelled: Sequence[tuple[str, xr.Dataset]],
+    *,
+    gain: bool | None = None,
+    angle: float | None = None,
+    noise: Noise | str | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """What a calibration rests on: how well each material explains measurements whose materials are known.
+
+    Parameters
+    ----------
+    library, labelled, gain, angle, noise
+        See :func:`calibrate_library`.
+    progress
+        Called with the number of finished measurements and of all.
+
+    Returns
+    -------
+    log_evidence, scores, truth
+        Shapes (B, C), (B, C) and (B,), as of :func:`pbrdf.identification.conformal.calibrate`.
+
+    Raises
+    ------
+    FitError, DataError
+        If a label is none of the library's materials, there are no measurements, or one is not valid.
+    """
     if not labelled:
         raise FitError("calibration: there are no labelled measurements")
     if isinstance(noise, str):
         noise = parse_noise(noise)
-    rows, scores, truth = [], [], []
-    for name, dataset in labelled:
-        truth.append(library.materials.index(library[name]))
+    truth = [library.names.index(library[name].name) for name, _ in labelled]
+    rows, scores = [], []
+    for number, (_, dataset) in enumerate(labelled, start=1):
         validate(dataset)
         observed = Observations.from_dataset(dataset, noise)
         free = unknown_gain(dataset) if gain is None else gain
         found = evidence(library.materials, [observed], gain=free, angle=angle)
         rows.append(found.log_evidence[0])
         scores.append(nominal(found.distance, found.degrees_of_freedom)[0])
-    calibration = calibrate(library.names, np.array(rows), np.array(scores), np.array(truth), measurements)
-    return Library(library.materials, calibration)
+        if progress is not None:
+            progress(number, len(labelled))
+    return np.array(rows), np.array(scores), np.array(truth)
 
 
 def check_request(library: Library, confidence: float) -> None:

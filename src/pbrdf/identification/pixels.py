@@ -169,14 +169,16 @@ def of_stokes(
             return known, np.empty((0, len(materials))), np.empty((0, len(materials))), np.empty(0)
         chosen = slice(None) if known.all() else known
         values, std = values[chosen], std[chosen]
-        incident = tuple(float(v) for v in block.attrs["illumination"])
+        theta_i, theta_r, phi = (angle[0] for angle in angles)
         like = Observations(
-            *(angle[0] for angle in angles),
-            tuple(measured),
-            values[0],
-            std[0],
-            incident,
-            True,  # type: ignore[arg-type]
+            theta_i=theta_i,
+            theta_r=theta_r,
+            phi=phi,
+            channels=tuple(measured),
+            values=values[0],
+            std=std[0],
+            illumination=tuple(float(v) for v in block.attrs["illumination"]),  # type: ignore[arg-type]
+            std_known=True,
         )
         if shared:
             if not tables:

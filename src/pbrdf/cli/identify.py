@@ -1,0 +1,415 @@
+"""``pbrdf identify``: which material of a library a measurement shows, or each pixel of a map."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from pbrdf.cli.command_line import command_line
+from pbrdf.cli.console import output_console, progress_bar, warn
+from pbrdf.cli.options import Backend, noise_option, output_option, quiet_option, with_reading_options
+from pbrdf.cli.reading import Reading
+from pbrdf.cli.specimens import BUNDLED, open_library, open_measurement, open_pixels
+from pbrdf.cli.values import numbers
+from pbrdf.errors import DataError, FitError, PbrdfError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from pbrdf.identification.library import Library
+
+__all__ = ["identify"]
+
+#: Columns of a table of labelled measurements.
+_COLUMNS = ("file", "material")
+_GAINS = {"known": False, "unknown": True}
+
+
+@with_reading_options
+def identify(
+    data: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="DATA",
+            help="Files of measured data, bundled paints, folders of `pbrdf fit`, or maps: of parameters, or of Stokes "
+            "parameters with dimensions beside geometry. Each is identified.",
+            show_default=False,
+        ),
+    ] = None,
+    *,
+    reading: Reading,
+    library: Annotated[
+        Path | None,
+        typer.Option(help="The library's file, see `pbrdf library`.", metavar="FILE", show_default=BUNDLED),
+    ] = None,
+    confidence: Annotated[
+        float, typer.Option(help="How often the set is to hold the true material, between 0 and 1.")
+    ] = 0.95,
+    gain: Annotated[
+        str | None,
+        typer.Option(
+            help="Whether a common factor of the intensities is known: known or unknown.",
+            metavar="known|unknown",
+            show_default="what the data say of their scale",
+        ),
+    ] = None,
+    angle: Annotated[
+        float | None,
+        typer.Option(
+            help="Standard deviation of an offset of the sample's angle, degrees.",
+            min=0.0,
+            show_default="none",
+        ),
+    ] = None,
+    noise: Annotated[
+        str | None,
+        noise_option(
+            "Noise as for `pbrdf fit`, e.g. 0.02,0.01.",
+            show_default="the uncertainties in the data, else an assumption",
+        ),
+    ] = None,
+    prior: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="How common a material is beforehand, e.g. white=0.5 (repeatable); the others share the rest.",
+            metavar="NAME=SHARE",
+            show_default="all alike",
+        ),
+    ] = None,
+    smoothing: Annotated[
+        float,
+        typer.Option(help="Maps: smooth over so many pixels first, where materials fill regions.", min=0.0),
+    ] = 0.0,
+    calibrate: Annotated[
+        Path | None,
+        typer.Option(
+            help="Calibrate with measurements of known materials instead: a CSV table with the columns file and "
+            "material. The library's file gets the calibration, or, with --output, FOLDER/library.json.",
+            metavar="LABELLED.csv",
+        ),
+    ] = None,
+    output: Annotated[
+        Path | None,
+        output_option(
+            "Folder for a page, figures and all numbers; of several data, one folder each within it.",
+            show_default="none; of a calibration <labelled>-calibration",
+        ),
+    ] = None,
+    figure_format: Annotated[str, typer.Option(help="Format of the figures: png, pdf or svg.")] = "png",
+    figures: Annotated[bool, typer.Option("--figures/--no-figures", help="Draw the figures.")] = True,
+    backend: Backend = None,
+    quiet: Annotated[
+        bool, quiet_option("Print only the set of each, or the name of a map's folder.")
+    ] = False,
+) -> None:
+    """Tell which material it is: a set at a stated confidence, probabilities, or none of these.
+
+    A material is a mean and a scatter over specimens; likelihoods are integrated over the specimens, and over a gain
+    and an offset of the angle where these are not known. docs/identification.md says what a set promises.
+
+    With bundled data: `pbrdf identify matte-white-thick`
+
+    With your own: `pbrdf identify panel.csv --library paints.json --noise 1% -o panel-material`
+
+    So that sets hold what they say: `pbrdf identify --calibrate labelled.csv --library paints.json`
+    """
+    from pbrdf.files.atomic import require_writable_folder
+    from pbrdf.identification.identify import check_request, shares
+    from pbrdf.report.style import FIGURE_FORMATS, leave_out_help_texts
+
+    sources = list(data or ())
+    if not sources and calibrate is None:
+        raise PbrdfError("name the data to identify, or a table of labelled measurements with --calibrate")
+    if sources and calibrate is not None:
+        raise PbrdfError(
+            f"--calibrate takes its data from {calibrate}: leave {sources[0]} out, and identify it afterwards"
+        )
+    if figure_format not in FIGURE_FORMATS:
+        raise PbrdfError(f"--figure-format {figure_format!r}: choose one of {', '.join(FIGURE_FORMATS)}")
+    if gain is not None and gain not in _GAINS:
+        raise PbrdfError(f"--gain {gain!r}: choose known or unknown")
+    if angle == 0.0:
+        raise PbrdfError("--angle 0: leave it out where the angle is exact")
+    common = numbers(prior or (), "--prior", "white=0.5")
+    folders = _folders(sources, output)
+    opened = open_library(library)
+    name = str(library or BUNDLED)
+    try:
+        check_request(opened, confidence)
+        shares(opened, common)
+    except FitError as error:
+        raise FitError(_with_option(str(error), name)) from error
+    for folder in folders:
+        require_writable_folder(folder)
+    if backend is not None:
+        from pbrdf.backend import set_backend
+
+        set_backend(backend)
+    asked: dict[str, Any] = {
+        "gain": None if gain is None else _GAINS[gain],
+        "angle": None if angle is None else math.radians(angle),
+        "noise": noise,
+    }
+    settings = {
+        "confidence": confidence,
+        "gain": gain,
+        "angle_degrees": angle,
+        "noise": noise,
+        "prior": common,
+        "smoothing": smoothing or None,
+        "reading": reading.stated(),
+    }
+    if output is not None and figures:
+        leave_out_help_texts()
+    request = _Request(
+        opened,
+        name,
+        reading,
+        confidence,
+        asked,
+        common,
+        smoothing,
+        settings,
+        figure_format if figures else None,
+        quiet,
+    )
+    if calibrate is not None:
+        _calibrate(request, calibrate, library, output)
+        return
+    for number, source in enumerate(sources):
+        into = folders[number] if folders else None
+        if number and not quiet:
+            print()
+        pixels = open_pixels(source)
+        if pixels is None:
+            _one(request, source, into)
+        else:
+            _every_pixel(request, source, pixels, into)
+
+
+@dataclass(frozen=True)
+class _Request:
+    """What the options ask for: the library and its name, how to read, what identification is told, what is written."""
+
+    library: Library
+    name: str
+    reading: Reading
+    confidence: float
+    asked: dict[str, Any]
+    prior: dict[str, float]
+    smoothing: float
+    settings: dict[str, Any]
+    drawn: str | None
+    quiet: bool
+
+
+def _one(request: _Request, source: str, folder: Path | None) -> None:
+    """Identify one measurement."""
+    from pbrdf.files.digest import sha256_of
+    from pbrdf.identification.identify import identify as identify_dataset
+    from pbrdf.report.identification.folder import write_identification
+    from pbrdf.report.identification.subject import Identified
+    from pbrdf.report.identification.summary import print_summary
+
+    if request.smoothing:
+        raise PbrdfError(f"--smoothing is for maps, and {source} is one measurement: leave it out")
+    measured = open_measurement(source, request.reading)
+    found = _told(
+        source,
+        lambda: identify_dataset(
+            measured.dataset,
+            request.library,
+            confidence=request.confidence,
+            prior=request.prior,
+            **request.asked,
+        ),
+    )
+    digest = sha256_of(Path(source)) if measured.fit is None else ""
+    report = Identified(
+        found, measured.dataset, source, request.name, request.prior, request.settings, command_line(), digest
+    )
+    written = [] if folder is None else write_identification(report, folder, figure_format=request.drawn)
+    if request.quiet:
+        print(f"{source}: {', '.join(found.materials) or 'none of these'}")
+        return
+    print_summary(report, output_console())
+    _say_written(folder, written)
+
+
+def _every_pixel(request: _Request, source: str, pixels: xr.Dataset, folder: Path | None) -> None:
+    """Identify every pixel of a map."""
+    from pbrdf.identification.class_map import identify_map
+    from pbrdf.identification.identify import unknown_gain
+    from pbrdf.report.identification.classified import Classified
+    from pbrdf.report.identification.folder import write_classes
+    from pbrdf.report.identification.summary import print_classes
+
+    gain, noise = request.asked["gain"], request.asked["noise"]
+    if given := request.reading.stated():
+        options = ", ".join("--" + option.replace("_", "-") for option in given)
+        raise DataError(f"{source} is a map, which needs no {options}: leave it out")
+    if request.asked["angle"] is not None:
+        raise PbrdfError(f"--angle: {source} is a map, whose angles count as exact: leave it out")
+    fitted = "estimate" in pixels
+    if fitted and not (gain is None and noise is None):
+        raise PbrdfError(
+            f"--gain and --noise: {source} holds fitted parameters, which need neither: leave them out"
+        )
+    with progress_bar(f"Identifying the pixels of {source}", request.quiet) as progress:
+        found = _told(
+            source,
+            lambda: identify_map(
+                pixels,
+                request.library,
+                confidence=request.confidence,
+                gain=gain,
+                noise=noise,
+                prior=request.prior,
+                smoothing=request.smoothing,
+                progress=progress,
+            ),
+        )
+    free = None if fitted else unknown_gain(pixels) if gain is None else gain
+    report = Classified(
+        found,
+        source,
+        request.library,
+        request.name,
+        free,
+        bool(pixels.attrs.get("simulated")),
+        request.prior,
+        request.settings,
+        command_line(),
+    )
+    written = [] if folder is None else write_classes(report, folder, figure_format=request.drawn)
+    if request.quiet:
+        print(folder if folder is not None else f"{source}: {_largest(report)}")
+        return
+    print_classes(report, output_console())
+    _say_written(folder, written)
+    if folder is None:
+        warn(f"{source}: the map of materials is not kept; --output FOLDER writes it")
+
+
+def _largest(report: Any) -> str:
+    """The materials that pixels show, most pixels first."""
+    seen = sorted((c for c in report.counts if c.pixels and c.value >= 0), key=lambda count: -count.pixels)
+    return ", ".join(count.name for count in seen) or "none of these"
+
+
+def _calibrate(request: _Request, table: Path, file: Path | None, output: Path | None) -> None:
+    """Calibrate a library, and report how honest it is."""
+    from pbrdf.files.atomic import require_writable_folder
+    from pbrdf.identification.conformal import calibrate
+    from pbrdf.identification.cross_check import cross_checked
+    from pbrdf.identification.identify import labelled_evidence
+    from pbrdf.identification.library import Library
+    from pbrdf.report.identification.calibrated import Calibrated
+    from pbrdf.report.identification.folder import LIBRARY, write_calibration
+    from pbrdf.report.identification.summary import print_calibration
+
+    library = request.library
+    folder = output or Path(f"{table.stem}-calibration")
+    require_writable_folder(folder)
+    within = file is None or output is not None
+    target = folder / LIBRARY if file is None or within else file
+    labelled = _labelled(table, library, request.reading)
+    with progress_bar(f"Calibrating with {table}", request.quiet) as progress:
+        rows, scores, truth = _told(
+            str(table), lambda: labelled_evidence(library, labelled, progress=progress, **request.asked)
+        )
+    words = f"{len(labelled)} of {table.name}"
+    made = Library(library.materials, calibrate(library.names, rows, scores, truth, words))
+    judged = cross_checked(library.names, rows, scores, truth)
+    report = Calibrated(
+        made, judged, request.confidence, str(table), str(target), request.settings, command_line()
+    )
+    written = write_calibration(report, folder, figure_format=request.drawn, with_library=within)
+    if not within:
+        made.write(target)
+    if request.quiet:
+        print(target)
+        return
+    print_calibration(report, output_console())
+    _say_written(folder, written)
+    output_console().print(
+        f"The calibration is in {target}: `pbrdf identify DATA --library {target}` uses it.", markup=False
+    )
+
+
+def _labelled(table: Path, library: Library, reading: Reading) -> list[tuple[str, xr.Dataset]]:
+    """Materials and data of a table of labels; files are looked for beside it."""
+    from pbrdf.files.text import read_bytes, utf8
+
+    rows = csv.DictReader(utf8(table, read_bytes(table)).decode().splitlines(), skipinitialspace=True)
+    columns = [str(column).strip() for column in rows.fieldnames or ()]
+    if not set(_COLUMNS) <= set(columns):
+        raise DataError(
+            f"--calibrate {table}: its columns must be file,material; they are {', '.join(columns)}"
+        )
+    rows.fieldnames = columns
+    labelled = []
+    for row in rows:
+        source, material = ((row[column] or "").strip() for column in _COLUMNS)
+        at = f"--calibrate {table}: line {rows.line_num}"
+        if not source or not material:
+            raise DataError(f"{at}: file or material is missing")
+        if material not in library.names:
+            raise DataError(
+                f"{at}: the library has no material {material!r}; it has {', '.join(library.names)}"
+            )
+        beside = table.parent / source
+        try:
+            measured = open_measurement(str(beside) if beside.exists() else source, reading)
+        except PbrdfError as error:
+            raise DataError(f"{at}: {error}") from error
+        labelled.append((material, measured.dataset))
+    if not labelled:
+        raise DataError(f"--calibrate {table}: there is no row below the names of the columns")
+    return labelled
+
+
+def _told(source: str, work: Callable[[], Any]) -> Any:
+    """Do the work; an error of identification names what it was about."""
+    try:
+        return work()
+    except FitError as error:
+        raise FitError(f"{source}: {error}") from error
+
+
+def _with_option(text: str, library: str) -> str:
+    """A sentence on an option named as on the command line."""
+    if text.startswith("confidence="):
+        return f"--confidence {text.removeprefix('confidence=')}"
+    if text.startswith("prior:"):
+        return f"--{text}"
+    return (
+        f"{library}: {text}"
+        if text.startswith("the library has no material:")
+        else f"--prior: {text} ({library})"
+    )
+
+
+def _folders(sources: list[str], output: Path | None) -> list[Path]:
+    """Where the results of each go; none without a folder for them."""
+    if output is None:
+        return []
+    stems = [Path(source).stem for source in sources]
+    for stem in stems:
+        if stems.count(stem) > 1:
+            raise PbrdfError(
+                f"two data sets are called {stem!r}: identify them one after the other, with --output"
+            )
+    return [output] if len(sources) <= 1 else [output / stem for stem in stems]
+
+
+def _say_written(folder: Path | None, written: list[Path]) -> None:
+    if folder is not None:
+        names = ", ".join(path.name for path in written)
+        output_console().print(f"\nWritten to {folder}/: {names}", markup=False)

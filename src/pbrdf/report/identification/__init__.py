@@ -1,0 +1,1 @@
+"""Identification in words and figures: libraries, single measurements, maps of materials, calibration."""
