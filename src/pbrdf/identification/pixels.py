@@ -171,12 +171,14 @@ def of_stokes(
         values, std = values[chosen], std[chosen]
         incident = tuple(float(v) for v in block.attrs["illumination"])
         like = Observations(
-            *(angle[0] for angle in angles),
-            tuple(measured),
-            values[0],
-            std[0],
-            incident,
-            True,  # type: ignore[arg-type]
+            theta_i=angles[0][0],
+            theta_r=angles[1][0],
+            phi=angles[2][0],
+            channels=tuple(measured),
+            values=values[0],
+            std=std[0],
+            illumination=incident,  # type: ignore[arg-type]
+            std_known=True,
         )
         if shared:
             if not tables:
