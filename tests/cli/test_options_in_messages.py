@@ -6,6 +6,7 @@ import ast
 import re
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 import typer
@@ -24,9 +25,16 @@ def options_of_commands() -> dict[str, set[str]]:
     group = typer.main.get_command(app)
     general = {name for p in group.params for name in p.opts}
     return {
-        command: general | {"--help"} | {name for p in one.params for name in (*p.opts, *p.secondary_opts)}
+        command: general
+        | {"--help"}
+        | {name for p in parameters(one) for name in (*p.opts, *p.secondary_opts)}
         for command, one in group.commands.items()
     }
+
+
+def parameters(command: Any) -> list[Any]:
+    """Of a command, or of all commands of a group."""
+    return [*command.params, *(p for one in getattr(command, "commands", {}).values() for p in one.params)]
 
 
 OPTIONS = options_of_commands()

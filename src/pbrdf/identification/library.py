@@ -41,7 +41,8 @@ __all__ = ["Library", "bundled_library", "read_library"]
 
 FORMAT, VERSION = "pbrdf material library", 1
 #: Scatter between specimens that the bundled paints are given, as the paper measured one panel of each.
-_PAINT_SCATTER = {"sigma": 0.15, "n": 0.02, "a": 0.05, "k": 0.05, "b": 0.05, "t": 0.03}
+#: (σ, n, a, k, b, t).
+_PAINT_SCATTER = (0.15, 0.02, 0.05, 0.05, 0.05, 0.03)
 
 
 @dataclass(frozen=True)
@@ -119,12 +120,15 @@ class Library:
 
 def bundled_library() -> Library:
     """The paper's five paints, labelled simulated, with an assumed scatter between panels."""
-    return Library(
-        tuple(
+    materials = []
+    for name in PAINTS:
+        paint = load_paint(name)
+        free = [p.name for p in paint.parameters if p.fitted]
+        materials.append(
             material_from_model(
                 name,
-                load_paint(name),
-                scatter=_PAINT_SCATTER,
+                paint,
+                scatter=dict(zip(free, _PAINT_SCATTER, strict=True)),
                 simulated=True,
                 wavelength=WAVELENGTH,
                 provenance=(
@@ -132,9 +136,8 @@ def bundled_library() -> Library:
                     "scatter between panels is assumed, not measured",
                 ),
             )
-            for name in PAINTS
         )
-    )
+    return Library(tuple(materials))
 
 
 def read_library(path: str | os.PathLike[str]) -> Library:
