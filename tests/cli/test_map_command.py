@@ -378,8 +378,71 @@ def test_data_with_dimensions_of_their_own(run, tmp_path):
     assert "a geometry is one too many" in refused
 
 
+def line_of_samples():
+    """Data of 3 samples without any noise, as a file holds them."""
+    theta_i, theta_r, phi = np.full(12, 30.0), np.linspace(0.0, 66.0, 12), np.tile([0.0, 180.0], 6)
+    stokes = pbrdf.DoubleGauss(sigma=0.1, n=1.55, a=0.5, k=1.1, b=0.2, t=0.5).stokes(
+        *np.deg2rad([theta_i, theta_r, phi])
+    )
+    data = {
+        name: (("geometry", "sample"), np.repeat(stokes[:, [k]], 3, axis=1)) for k, name in enumerate("IQU")
+    } | {f"{name}_std": (("geometry", "sample"), np.full((12, 3), 1e-3)) for name in "IQU"}
+    angles = {"theta_i": theta_i, "theta_r": theta_r, "phi": phi}
+    coords = {name: ("geometry", values, {"units": "degree"}) for name, values in angles.items()}
+    attrs = {"quantity": "brdf", "stokes_convention": "p-s", "illumination": [1.0, 0, 0, 0], "simulated": 1}
+    return xr.Dataset(data, {**coords, "group": ("geometry", np.zeros(12, int))}, attrs)
+
+
+def written(ds, path):
+    ds.to_netcdf(path, engine="h5netcdf")
+    return path.read_bytes()
+
+
 @pytest.mark.slow
-def test_not_one_pixel_converged_is_exit_code_3(run, tmp_path):
+def test_not_one_pixel_has_a_result_is_exit_code_3(run, tmp_path):
+    written(line_of_samples().map(lambda values: values * np.nan, keep_attrs=True), tmp_path / "none.nc")
+    told = run("map", "none.nc", "-o", "none.zarr", "--no-figures", code=3)
+    assert "No pixel was measured." in told.stdout
+    assert (opened(tmp_path / "none.zarr")["status"] == 4).all()
+
+
+def test_a_map_is_not_put_in_the_place_of_what_it_is_made_from(refused, tmp_path):
+    before = written(line_of_samples(), tmp_path / "data.nc")
+    (tmp_path / "link.nc").symlink_to("data.nc")
+    for name in ("data.nc", "link.nc"):
+        words = f"--output {name}: the map is made from this file; choose another name"
+        assert words in refused("map", "data.nc", "-o", name)
+    assert (tmp_path / "data.nc").read_bytes() == before
+
+
+def test_refused_data_name_their_file(refused, tmp_path):
+    whole = line_of_samples()
+    written(whole.isel(sample=slice(0, 0)), tmp_path / "empty.nc")
+    assert "empty.nc: has no pixels, 0 (sample)" in refused("map", "empty.nc", "-o", "x.zarr")
+    written(whole.drop_attrs(deep=False), tmp_path / "bare.nc")
+    assert "bare.nc: the data set does not follow the schema" in refused("map", "bare.nc", "-o", "x.zarr")
+    written(whole, tmp_path / "data.nc")
+    assert "data.nc: holds data, which say themselves" in refused("map", "data.nc", "--counts-per-brdf", 10)
+    assert not (tmp_path / "x.zarr").exists()
+
+
+@pytest.mark.slow
+def test_another_command_on_a_store_is_refused_before_what_pixels_share_is_sought(run, tmp_path, monkeypatch):
+    written(line_of_samples(), tmp_path / "data.nc")
+    common = ("map", "data.nc", "-o", "x.zarr", "--no-figures", "--fix", "n=1.55", "--share")
+    run(*common, "k", "-q")
+    before = (tmp_path / "x-shared.npz").read_bytes()
+    monkeypatch.setattr(MapFit, "solve_shared", lambda *_: pytest.fail("sought"))
+    assert (
+        'x.zarr: this map was begun with other settings: fit.share[0]: "k"'
+        in run(*common, "b", code=2).stderr
+    )
+    assert (tmp_path / "x-shared.npz").read_bytes() == before
+    run(*common, "k", "-q")
+
+
+@pytest.mark.slow
+def test_too_few_values_are_told_before_the_fit(run, tmp_path):
     pictures = blank(4, 4, 1)
     pictures.to_netcdf(tmp_path / "few.nc", engine="h5netcdf")
     told = run(
@@ -416,8 +479,8 @@ def test_the_film_polarisers_as_far_as_one_picture_goes(run, tmp_path, measured)
     ("arguments", "words"),
     [
         (("ball.nc",), "Stokes pictures need the geometry of their pixels, for example flat:theta_i=30"),
-        (("ball.nc", "-g", "cube"), "geometry 'cube': begin with one of flat, sphere, cylinder"),
-        (("ball.nc", "-g", "flat:theta_i=a"), "flat: theta_i is 'a', not a number"),
+        (("ball.nc", "-g", "cube"), "--geometry: geometry 'cube': begin with one of flat, sphere, cylinder"),
+        (("ball.nc", "-g", "flat:theta_i=a"), "--geometry: flat: theta_i is 'a', not a number"),
         (("none.nc", "-g", "flat"), "none.nc: there is no such file"),
         (
             ("ball.nc", "-g", "flat", "-o", "x.tif"),
@@ -428,6 +491,13 @@ def test_the_film_polarisers_as_far_as_one_picture_goes(run, tmp_path, measured)
         (("ball.nc", "--worker", "half"), "--worker 'half': give i/N, counted from 1"),
         (("ball.nc", "--worker", "1/2", "--scheduler", "tcp://a:1"), "give one of the two"),
         (("ball.nc", "--worker", "1/2", "-o", "x.nc"), "several workers fill a store"),
+        (("ball.nc", "--counts-per-brdf", "0"), "--counts-per-brdf 0: it must be more than 0"),
+        (("ball.nc", "--counts-per-brdf=-3"), "--counts-per-brdf -3: it must be more than 0"),
+        (
+            ("ball.nc", "-g", "{}", "--labels", "wide.npy"),
+            "wide.npy: region '1099511627776': a label has at most 32",
+        ),
+        (("dark.nc", "-g", "sphere:light=40@90"), "the geometry of dark.nc: no round outline"),
         (("ball.nc", "--angles", "a.csv"), "--angles belongs to --polarimeter"),
         (("ball.nc", "-g", "{}", "--share", "kappa"), "share: 'kappa' is not a free parameter"),
         (("ball.nc", "-g", "{}", "--fix", "m=1"), "has no parameter"),
@@ -444,6 +514,8 @@ def test_the_film_polarisers_as_far_as_one_picture_goes(run, tmp_path, measured)
 )
 def test_refusals_are_one_line(refused, tmp_path, ball, arguments, words):
     Image.fromarray(np.zeros((3, 3), np.uint8)).save(tmp_path / "small.png")
+    np.save(tmp_path / "wide.npy", np.full((32, 40), 2**40))
+    written(blank(12, 12, 1), tmp_path / "dark.nc")
     (tmp_path / "one.csv").write_text("theta_i,theta_r,phi,I\n30,10,0,1\n", encoding="utf-8")
     filled = [word.replace("{}", ball[1]) for word in arguments]
     assert words in refused("map", *filled)

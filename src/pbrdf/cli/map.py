@@ -33,7 +33,7 @@ from pbrdf.cli.fit_options import (
 from pbrdf.cli.interrupt import say_when_interrupted
 from pbrdf.cli.options import Backend, output_option, polarimeter_option, quiet_option, seed_option
 from pbrdf.cli.values import memory_size, require_folder_of
-from pbrdf.errors import PbrdfError
+from pbrdf.errors import DataError, PbrdfError
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -178,11 +178,12 @@ def map_pixels(
     (index.html: open it in a browser), summary.txt and figures. While it runs, MAP-report/quicklook.png shows what is
     done. Interrupted or killed, it goes on where it was when the same command is run again.
 
-    Geometries (angles in degrees, all keys in docs/maps.md): `flat`, with `theta_i=30,theta_r=40,phi=0` after a colon
-    or the angles of `pbrdf reduce --angles`, and `fov=20` for perspective; `sphere:light=POLAR@AZIMUTH` and
-    `cylinder:light=…`, found in the picture; `normals:FILE,light=…`; `angles:FILE`; `mesh:FILE,camera=X/Y/Z,light=…`.
+    Geometries (angles in degrees, all keys in docs/pixel-geometry.md): `flat`, with `theta_i=30,theta_r=40,phi=0`
+    after a colon or the angles of `pbrdf reduce --angles`, and `fov=20` for perspective; `sphere:light=POLAR@AZIMUTH`
+    and `cylinder:light=…`, found in the picture; `normals:FILE,light=…`; `angles:FILE`;
+    `mesh:FILE,camera=X/Y/Z,light=…`.
 
-    Exit code 3: not one of the measured pixels has converged.
+    Exit code 3: not one pixel has a result.
 
     A panel under several lights: `pbrdf map run-reduced/stokes.nc -g flat:fov=20 -o paint.zarr`
 
@@ -195,6 +196,9 @@ def map_pixels(
     target = output or Path(f"{stokes[0].resolve().stem}-map.zarr")
     place = _worker(worker)
     _check_output(target, place, scheduler)
+    _require_not_read(target, [*stokes, labels, angles, *map(Path, filter(None, (polarimeter, model)))])
+    if counts_per_brdf is not None and not 0.0 < counts_per_brdf < math.inf:
+        raise PbrdfError(f"--counts-per-brdf {counts_per_brdf:g}: it must be more than 0")
     arguments = fit_arguments(
         option=option,
         fix=fix,
@@ -216,7 +220,10 @@ def map_pixels(
     from pbrdf.files.atomic import require_writable_folder
     from pbrdf.instruments.pixel_geometry.text_form import parse_pixel_geometry
 
-    places = [parse_pixel_geometry(text) for text in geometry or ()]
+    try:
+        places = [parse_pixel_geometry(text) for text in geometry or ()]
+    except PbrdfError as error:
+        raise PbrdfError(f"--geometry: {error}") from error
     report = target.with_name(f"{target.stem}-report")
     require_writable_folder(report)
     if backend is not None:
@@ -226,6 +233,7 @@ def map_pixels(
     if polarimeter is not None:
         stokes = _reduced(stokes, polarimeter, angles, target, quiet)
     from pbrdf.inversion.map_store import open_map
+    from pbrdf.inversion.map_store.map_store import MapStore
     from pbrdf.inversion.map_store.picture_source import PictureSource
     from pbrdf.inversion.parameter_map import MapFit
     from pbrdf.inversion.parameter_map.map_fit import LABEL
@@ -233,7 +241,13 @@ def map_pixels(
 
     named = None if labels is None else LABEL
     source = PictureSource.open(stokes, places, scale=counts_per_brdf, labels=labels)
-    fit = MapFit.prepare(source.outline(), chosen, labels=named, **arguments)
+    try:
+        fit = MapFit.prepare(source.outline(), chosen, labels=named, **arguments)
+    except DataError as error:
+        raise DataError(f"{stokes[0]}: {error}") from error
+    if target.exists() and target.suffix == ".zarr":
+        # before what pixels share is sought, which takes long
+        MapStore(target, fit, source).require_same_settings(apart_from="fit.shared")
     if target.suffix == ".nc":
         found = _fit_in_memory(source, chosen, target, {"labels": named, **arguments}, quiet)
     else:
@@ -272,6 +286,13 @@ def _check_output(target: Path, place: tuple[int, int] | None, scheduler: str | 
             )
     else:
         require_zarr(target)
+
+
+def _require_not_read(target: Path, read: Sequence[Path | None]) -> None:
+    """Check that the map is not put in the place of a file that it is made from."""
+    for path in read:
+        if path is not None and path.resolve() == target.resolve():
+            raise PbrdfError(f"--output {target}: the map is made from this file; choose another name")
 
 
 def _worker(text: str | None) -> tuple[int, int] | None:
@@ -440,5 +461,5 @@ def _report(subject: MapReport, folder: Path, formats: Sequence[str], figures: b
         print_map(summary, console)
         names = ", ".join(file.name for file in files)
         console.print(f"\nWritten: {subject.path}, and {folder}/: {names}", markup=False)
-    if summary.measured and not summary.fitted:
+    if not summary.fitted:
         raise typer.Exit(NOT_CONVERGED)

@@ -62,7 +62,10 @@ def label_map(regions: Mapping[str, Region], rows: int, columns: int) -> xr.Data
         name: region.value if isinstance(region, LabelRegion) and name == str(region.value) else i
         for i, (name, region) in enumerate(regions.items(), 1)
     }
+    reach = np.iinfo(labels.dtype)
     for name, region in regions.items():
+        if not reach.min <= numbers[name] <= reach.max:
+            raise DataError(f"region {name!r}: a label has at most 32 bits, from {reach.min} to {reach.max}")
         mask = region.mask(0, rows, columns)
         if (labels[mask] != 0).any():
             raise DataError(f"region {name!r} overlaps another one: a pixel has one label")

@@ -171,8 +171,19 @@ class MapStore:
         mark = self._arrays[MARK]
         return UnitGrid(tuple(mark.metadata.dimension_names), mark.shape, mark.shards, mark.chunks)
 
-    def require_same_settings(self) -> None:
-        """Check that the store is one of these settings and this input; raises DataError, which says what differs."""
+    def require_same_settings(self, apart_from: str | None = None) -> None:
+        """Check that the store is one of these settings and this input.
+
+        Parameters
+        ----------
+        apart_from
+            Name of a setting that is not known yet, ``fit.shared``.
+
+        Raises
+        ------
+        DataError
+            If it is not; says what differs.
+        """
         attributes = stored_attributes(self.path)
         if attributes.get(_DIGEST) == self.digest:
             return
@@ -180,7 +191,12 @@ class MapStore:
             stored = json_from_text(str(attributes.get(_SETTINGS)))
         except ValueError as error:
             raise DataError(f"{self.path}: the settings of this map are not JSON: it is damaged") from error
-        found = list(differences(stored, json.loads(settings_text(self.settings))))
+        every = differences(stored, json.loads(settings_text(self.settings)))
+        wanted = [said for said in every if apart_from is None or not said.startswith(apart_from)]
+        if apart_from is not None and not wanted:
+            return
+        # digests say that something differs, and the others what
+        found = sorted(wanted, key=lambda said: said.partition(":")[0].endswith("digest"))
         more = f"; and {len(found) - 3} more" if len(found) > 3 else ""
         raise DataError(
             f"{self.path}: this map was begun with other settings: {'; '.join(found[:3])}{more}. Choose another "

@@ -105,10 +105,15 @@ class PictureSource:
                     f"{len(geometry)} geometries for {len(paths)} files: give one, or one for each"
                 )
             each = list(geometry) * (len(paths) // len(geometry))
-            located = tuple(g.located(one) for g, one in zip(each, opened, strict=True))
+            located = tuple(map(_located, each, opened, paths))
         elif geometry:
             raise DataError(
                 f"{paths[0]}: holds data with the angles of every pixel: a geometry is one too many"
+            )
+        elif scale is not None:
+            raise DataError(
+                f"{paths[0]}: holds data, which say themselves what their values are: counts per BRDF belong to Stokes "
+                "pictures"
             )
         found = [_pixel_sizes(path, one) for path, one in zip(paths, opened, strict=True)]
         for path, sizes in zip(paths, found, strict=True):
@@ -236,13 +241,23 @@ def opened_pictures(path: Path) -> xr.Dataset:
     return opened
 
 
+def _located(geometry: PixelGeometry, opened: xr.Dataset, path: Path) -> PixelGeometry:
+    try:
+        return geometry.located(opened)
+    except DataError as error:
+        raise DataError(f"the geometry of {path}: {error}") from error
+
+
 def _pixel_sizes(path: Path, opened: xr.Dataset) -> dict[str, int]:
     """Dimensions of the map in a file, in the order of its data."""
     kept = (DIMENSION, _SERIES, *STOKES_AXES)
     dims = [str(d) for v in opened.data_vars.values() for d in v.dims if d not in kept]
     if not dims:
         raise DataError(f"{path}: has one value for each geometry and no pixels: fit it with `pbrdf fit`")
-    return {dim: opened.sizes[dim] for dim in dict.fromkeys(dims)}
+    sizes = {dim: opened.sizes[dim] for dim in dict.fromkeys(dims)}
+    if 0 in sizes.values():
+        raise DataError(f"{path}: has no pixels, {_in_words(sizes)}")
+    return sizes
 
 
 def _in_words(sizes: Mapping[str, int]) -> str:

@@ -43,8 +43,12 @@ def differences(stored: Any, ours: Any, name: str = "") -> Iterator[str]:
 #: What stands for a setting that is not there.
 _ABSENT = "(none)"
 _LONGEST = 40
+#: What ends a text, a list or a table in JSON.
+_ENDS = '"]}'
 
 
 def _shown(value: Any) -> str:
     text = value if value is _ABSENT else settings_text(value)
-    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 1]}…"
+    return (
+        text if len(text) <= _LONGEST else f"{text[: _LONGEST - 1]}…{text[-1] if text[-1] in _ENDS else ''}"
+    )
