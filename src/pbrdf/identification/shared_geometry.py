@@ -30,7 +30,7 @@ __all__ = ["SharedGeometry"]
 BEYOND, FARTHER = 1e-6, 40.0
 #: The tables' squared errors in units of the data's, summed, are no more than this part of the spread of the distance,
 #: which is √(2 D) for D data; else the model itself is evaluated. Judged by so many pixels.
-TOLERATED, JUDGES = 0.5, 1000
+TOLERATED, JUDGES = 0.1, 1000
 #: Pixels for which a model is evaluated together.
 TOGETHER = 1 << 12
 
