@@ -96,5 +96,5 @@ def test_differences_are_named_by_their_place():
     assert list(differences(here, here)) == []
     assert list(differences([1], [1, 2], "share")) == ["share: [1] in the store, [1, 2] here"]
     (told,) = differences({"a": "x" * 100}, {"a": "y"})
-    assert told == f'a: "{"x" * 38}… in the store, "y" here'
+    assert told == f'a: "{"x" * 38}…" in the store, "y" here'
     assert digest_of({"b": 1, "a": [2.5]}) == digest_of({"a": [2.5], "b": 1})

@@ -94,7 +94,10 @@ def test_a_store_of_other_settings_or_another_input_is_refused_by_name(store):
     named = picture().assign_attrs(quantity="radiance")
     for make, words in (
         (lambda: store_at(store.path, seed=1), r"fit\.seed: 0 in the store, 1 here\. Choose another folder"),
-        (lambda: store_at(store.path, other), r'input\.variables\.I\.digest: "[0-9a-f]{38}… in the store, "'),
+        (
+            lambda: store_at(store.path, other),
+            r'input\.variables\.I\.digest: "[0-9a-f]{38}…" in the store, "',
+        ),
         (lambda: store_at(store.path, named), r'attributes\.quantity: "brdf" in the store, "radiance" here'),
         (lambda: store_at(store.path, picture(40, 30)), r"I\.form: .*x: 28.*in the store, .*x: 30"),
     ):

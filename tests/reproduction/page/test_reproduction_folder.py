@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 
 import pytest
 
@@ -98,7 +99,8 @@ def test_the_tables_have_the_numbers_of_the_run(folder, reproduction):
 
 def test_the_page_shows_failures_and_needs_nothing_but_itself(folder, reproduction):
     text = (folder / "index.html").read_text(encoding="utf-8")
-    assert "http" not in text
+    # the letters of an encoded picture may spell anything
+    assert "http" not in re.sub(r"base64,[A-Za-z0-9+/=]+", "", text)
     assert text.count("data:image/png;base64,") == 5
     failures = sum(not o.passed for e in reproduction.statements for o in e.outcomes.values())
     assert text.count("✗ fails") == failures
