@@ -497,7 +497,10 @@ def _sum_edge(integrand: Callable[..., Any], size: int, state: Any, rows: _Rows)
 def _sum_wedge(
     integrand: Callable[..., Any], size: int, state: Any, lanes: Any, along: Any, rows: _Rows
 ) -> list[Any]:
-    """Rows between both edges, or in the lanes ``along`` along the nearer one: one loop, which is compiled once."""
+    """Rows between both edges, or in the lanes ``along`` along the nearer one: one loop, which is compiled once.
+
+    Where ``along`` is False, of all lanes, the two points of a pair are taken together, which is faster.
+    """
     UInt = type(rows.count)
     begin = dr.select(along, rows.first_along, rows.first)
     number = dr.select(along, rows.count_along, rows.count)
@@ -517,19 +520,33 @@ def _sum_wedge(
         ends = tuple(dr.select(along, 0.0, tail) for tail in ends)
         w = sigma * w
 
+        def node(row: Any, v: Any, weight: Any, vectors: Any, args: Any) -> list[Any]:
+            (x, y), length2, e, row_weight, _ = row
+            inverse = dr.rsqrt(dr.fma(v, v, length2))
+            slopes = dr.fma(e[0], v, x), dr.fma(e[1], v, y)
+            return _within(integrand, *slopes, inverse, row_weight * weight, vectors, args)
+
         def point(j: Any, sigma: Any, vectors: Any, args: Any, row: Any) -> list[Any]:
-            (x, y), length2, e, row_weight, ends = row
             # of the two of a pair one by one: what is compiled is shorter
             below, above, weight, whole = rows.pairs(first + (j >> 1))
             odd = (j & 1) == 1
-            v, share = _between(dr.select(odd, above, below), dr.select(odd, below, above), *ends)
+            v, share = _between(dr.select(odd, above, below), dr.select(odd, below, above), *row[-1])
             v = sigma * dr.select(along, dr.select(odd, -whole, whole), v)
-            inverse = dr.rsqrt(dr.fma(v, v, length2))
-            slopes = dr.fma(e[0], v, x), dr.fma(e[1], v, y)
-            return _within(integrand, *slopes, inverse, row_weight * weight * share, vectors, args)
+            return node(row, v, weight * share, vectors, args)
+
+        def pair(j: Any, sigma: Any, vectors: Any, args: Any, row: Any) -> list[Any]:
+            below, above, weight, _ = rows.pairs(first + j)
+            found = []
+            for tails in ((below, above), (above, below)):
+                v, share = _between(*tails, *row[-1])
+                found.append(node(row, sigma * v, weight * share, vectors, args))
+            return _added(*found)
 
         inner = sigma, vectors, args, ((w * f[0], w * f[1]), dr.fma(w, w, 1.0), e, weight * share, ends)
-        return summed(point, 2 * count, size, inner, differentiated((sigma, vectors, args)), "row points")
+        by = differentiated((sigma, vectors, args))
+        if along is False:
+            return summed(pair, count, size, inner, by, "row pairs")
+        return summed(point, 2 * count, size, inner, by, "row points")
 
     return summed(row, dr.select(lanes, number, UInt(0)), size, state, label="rows")
 
