@@ -138,3 +138,19 @@ def test_what_does_not_fit_is_said(noisy):
         as_geometries(noisy, corner)
     with pytest.raises(DataError, match="bins are from 0 to 90"):
         as_geometries(noisy, bins=0.0)
+
+
+def test_chunks_of_dask_arrays_are_computed_once(noisy):
+    da = pytest.importorskip("dask.array")
+    calls = []
+
+    def counted(block):
+        calls.append(block.shape)
+        return block
+
+    sizes = noisy["I"].shape
+    pictures = da.from_array(noisy["I"].values, chunks=sizes).map_blocks(counted, meta=np.empty((0, 0, 0)))
+    lazy = noisy.assign(I=(noisy["I"].dims, pictures))
+    found = as_geometries(lazy)["sample"]
+    assert calls == [sizes]
+    xr.testing.assert_identical(found, as_geometries(noisy)["sample"])

@@ -163,3 +163,17 @@ def test_sizes_of_blocks(data):
     many = xr.Dataset({"I": (("geometry", "y", "x"), np.broadcast_to(0.0, (100_000, 50, 30)))})
     sizes = block_sizes(many, ("y", "x"), None)
     assert sizes["y"] * sizes["x"] * 100_000 <= 1 << 24
+
+
+@pytest.mark.slow
+def test_data_of_a_file_opened_with_xarray_are_data(data, tmp_path):
+    """Files give numbers and lists among the attributes back as those of NumPy."""
+    data.to_netcdf(tmp_path / "data.nc", engine="h5netcdf")
+    with xr.open_dataset(tmp_path / "data.nc", engine="h5netcdf") as found:
+        assert isinstance(found.attrs["illumination"], np.ndarray)
+        xr.testing.assert_equal(pbrdf.fit_map(found, **FEW), pbrdf.fit_map(data, **FEW))
+
+
+def test_no_pixels_are_refused(data):
+    with pytest.raises(pbrdf.DataError, match="the data have no pixels: y: 0, x: 7"):
+        pbrdf.fit_map(data.isel(y=slice(0, 0)), **FEW)

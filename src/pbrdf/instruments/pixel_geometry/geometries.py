@@ -9,6 +9,7 @@ series lie on a surface), and its value at the mean direction is taken, with its
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -142,8 +143,7 @@ def _one_label(
 def _taken(dataset: xr.Dataset, known: list[int], chosen: np.ndarray, every: int) -> _Pixels:
     """The measured pixels of a label."""
     parts = []
-    for i in range(dataset.sizes[DIMENSION]):
-        one = dataset.isel({DIMENSION: i})
+    for i, one in enumerate(_loaded(dataset, known)):
         stokes = np.stack([one[STOKES[k]].transpose("y", "x").values for k in known], axis=-1)
         where = np.nonzero(chosen & np.isfinite(stokes).all(axis=-1))
         where = tuple(index[::every] for index in where)
@@ -157,6 +157,18 @@ def _taken(dataset: xr.Dataset, known: list[int], chosen: np.ndarray, every: int
     angles, values, covariances, series = zip(*parts, strict=True)
     spread = None if covariances[0] is None else np.concatenate(covariances)
     return _Pixels(np.concatenate(angles), np.concatenate(values), spread, np.concatenate(series))
+
+
+def _loaded(dataset: xr.Dataset, known: list[int]) -> Iterator[xr.Dataset]:
+    """One geometry after the other in memory; of Dask arrays each chunk is computed once."""
+    wanted = [*(STOKES[k] for k in known), *(name for name in (COVARIANCE,) if name in dataset)]
+    needed = dataset[[*wanted, "theta_i", "theta_r", "phi"]]
+    lengths = needed.unify_chunks().chunksizes.get(DIMENSION, (1,) * needed.sizes[DIMENSION])
+    begin = 0
+    for length in lengths:
+        chunk = needed.isel({DIMENSION: slice(begin, begin + length)}).compute()
+        yield from (chunk.isel({DIMENSION: i}) for i in range(length))
+        begin += length
 
 
 def _bin_numbers(pixels: _Pixels, width: float) -> np.ndarray:

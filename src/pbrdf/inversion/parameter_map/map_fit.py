@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pbrdf.data.formats.attributes import plain_attributes
 from pbrdf.data.schema import (
     COORDINATES,
     COVARIANCE,
@@ -616,6 +617,10 @@ def _image_dims(dataset: xr.Dataset, labels: str | None) -> tuple[str, ...]:
             f"the data have no dimension beside {DIMENSION!r} along which to fit a map, such as y and x: fit a single "
             "data set with pbrdf.fit"
         )
+    if any(dataset.sizes[dim] == 0 for dim in dims):
+        raise DataError(
+            f"the data have no pixels: {', '.join(f'{dim}: {dataset.sizes[dim]}' for dim in dims)}"
+        )
     if labels is not None and labels not in dataset.variables:
         raise DataError(f"labels: the data set has no variable {labels!r}; it has {_listed(dataset)}")
     for name in (MASK, labels):
@@ -667,7 +672,7 @@ def _form(dataset: xr.Dataset, dims: Sequence[str]) -> xr.Dataset:
             coords[name] = (variable.dims, variable.values)
         elif name in dataset.data_vars and (own or (name != MASK and variable.dtype.kind not in "biu")):
             variables[name] = (variable.dims, np.empty([0] * variable.ndim))
-    form = xr.Dataset(coords=coords, attrs=dataset.attrs)
+    form = xr.Dataset(coords=coords, attrs=plain_attributes(dataset.attrs))
     # beside each other, not aligned: the schema is to judge them
     for name, (at, values) in variables.items():
         form[name] = (at, values) if name in _MEASURED else ((), 0.0)
