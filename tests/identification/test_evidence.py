@@ -130,6 +130,21 @@ def test_many_measurements_are_each_by_itself():
         assert together.distance[b] == pytest.approx(alone.distance[0], rel=1e-4, abs=1e-4)
 
 
+def test_parts_of_many_measurements(monkeypatch):
+    """More than are looked at together, with an unknown gain: as one by one."""
+    import pbrdf.identification.evidence as module
+
+    materials = bundled_library().materials
+    data = [observed(pbrdf.load_paint(name), seed=i) for i, name in enumerate(pbrdf.PAINTS)]
+    whole = evidence(materials, data, gain=True)
+    monkeypatch.setattr(module, "TOGETHER", 2)
+    parts = evidence(materials, data, gain=True)
+    assert parts.log_evidence == pytest.approx(whole.log_evidence, rel=1e-4, abs=1e-4)
+    assert np.array_equal(parts.degrees_of_freedom, whole.degrees_of_freedom)
+    for c in range(len(materials)):
+        assert parts.values[c] == pytest.approx(whole.values[c], rel=1e-4)
+
+
 def test_a_turned_sample_is_recognised_if_its_offset_is_allowed_for():
     """Sample turned by one degree in the plane of incidence: the glossy paint's peak is elsewhere."""
     offset = np.radians(1.0)

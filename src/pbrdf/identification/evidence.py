@@ -28,7 +28,7 @@ from pbrdf.errors import FitError
 from pbrdf.identification.material import Material
 from pbrdf.inversion.nuisance import KINDS
 from pbrdf.inversion.observations import Observations
-from pbrdf.inversion.problem import Space, Term, derivatives, misfits, predict
+from pbrdf.inversion.problem import Space, Term, derivatives, misfits, signals_of
 from pbrdf.inversion.solver import Residuals, Solution, solve
 from pbrdf.inversion.stack import Stack
 
@@ -38,6 +38,8 @@ __all__ = ["Evidence", "evidence", "linearised", "posterior"]
 GAIN_SPREAD = 3.0
 #: How far from its mean, in standard deviations, a specimen is looked for.
 REACH = 8.0
+#: Measurements whose likelihoods are found together, at most: more take more memory.
+TOGETHER = 1 << 12
 #: A specimen farther than this from its mean is looked for again, starting no farther than that.
 FAR, NEAR = 5.0, 3.0
 
@@ -66,7 +68,7 @@ class Evidence:
 
 def evidence(
     materials: Sequence[Material],
-    data: Sequence[Observations],
+    data: Sequence[Observations] | Stack,
     *,
     gain: bool = False,
     angle: float | None = None,
@@ -80,7 +82,7 @@ def evidence(
     materials
         C materials; their models may differ.
     data
-        B measurements with the same channels, number of geometries and illumination.
+        B measurements with the same channels, number of geometries and illumination; a channel may be missing in some.
     gain
         Whether all intensities have a common factor that is not known.
     angle
@@ -95,16 +97,30 @@ def evidence(
     FitError
         If the measurements differ in form, or an angle's offset is asked for out of the plane of incidence.
     """
-    batch, count = len(data), len(materials)
+    stack = data if isinstance(data, Stack) else Stack.of(data)
+    batch, count = len(stack), len(materials)
+    if batch > TOGETHER:
+        asked: dict[str, Any] = {"gain": gain, "angle": angle, "accuracy": accuracy}
+        return _joined(
+            [
+                evidence(
+                    materials,
+                    stack.take(np.arange(begin, min(begin + TOGETHER, batch))),
+                    max_iterations=max_iterations,
+                    **asked,
+                )
+                for begin in range(0, batch, TOGETHER)
+            ]
+        )
     log_evidence, distance = np.empty((batch, count)), np.empty((batch, count))
     values: list[Any] = [None] * count
-    gain = gain and not all(is_ratio(channel) for channel in data[0].channels)
-    factors = _best_gains(materials, data) if gain else None
+    gain = gain and not all(is_ratio(channel) for channel in stack.channels)
+    factors = _best_gains(materials, stack) if gain else None
     centre = None if factors is None else factors.mean(axis=1)
     for members in _alike(materials):
         group = [materials[i] for i in members]
         start = None if factors is None else factors[:, members]
-        solution = _of_one_model(group, data, start, centre, angle, accuracy, max_iterations)
+        solution = _of_one_model(group, stack, start, centre, angle, accuracy, max_iterations)
         size, shape = len(group[0].mean), (batch, len(group))
         cost = solution.cost.reshape(shape)
         logdet = np.linalg.slogdet(solution.information)[1].reshape(shape)
@@ -117,8 +133,17 @@ def evidence(
             own = materials[member]
             unknowns = np.clip(own.mean + z[:, place] @ own.root.T, *own.space.box)
             values[member] = own.space.to_parameters(unknowns)
-    measured = np.array([int(np.isfinite(o.std).sum()) for o in data])
-    return Evidence(log_evidence, distance, measured - int(gain), tuple(values))
+    return Evidence(log_evidence, distance, stack.count - int(gain), tuple(values))
+
+
+def _joined(parts: Sequence[Evidence]) -> Evidence:
+    """Of measurements one after the other."""
+    return Evidence(
+        log_evidence=np.concatenate([part.log_evidence for part in parts]),
+        distance=np.concatenate([part.distance for part in parts]),
+        degrees_of_freedom=np.concatenate([part.degrees_of_freedom for part in parts]),
+        values=tuple(np.concatenate(own) for own in zip(*(part.values for part in parts), strict=True)),
+    )
 
 
 def posterior(
@@ -139,9 +164,10 @@ def posterior(
         Shapes (B, Z), (B, Z, Z) and (B,), None where the gain is known. z holds the specimen's numbers, then the
         gain's (ln g = centre + ``GAIN_SPREAD`` z) and that of the sample's angle (δ = ``angle`` z).
     """
-    factors = _best_gains([material], data) if gain else None
+    stack = Stack.of(data)
+    factors = _best_gains([material], stack) if gain else None
     centre = None if factors is None else factors.mean(axis=1)
-    solution = _of_one_model([material], data, factors, centre, angle, accuracy, 50)
+    solution = _of_one_model([material], stack, factors, centre, angle, accuracy, 50)
     return solution.u, solution.information, centre
 
 
@@ -202,32 +228,38 @@ def _alike(materials: Sequence[Material]) -> list[list[int]]:
     return list(groups.values())
 
 
-def _best_gains(materials: Sequence[Material], data: Sequence[Observations]) -> np.ndarray:
+def _best_gains(materials: Sequence[Material], stack: Stack) -> np.ndarray:
     """Logarithm of the gain at which the mean of each material fits the intensities best, shape (B, C)."""
-    first = data[0]
-    rows = [c for c, name in enumerate(first.channels) if not is_ratio(name)]
-    names = [first.channels[c] for c in rows]
-    gains = np.empty((len(data), len(materials)))
-    shared = all(
-        np.array_equal(getattr(o, name), getattr(first, name))
-        for o in data[1:]
-        for name in ("theta_i", "theta_r", "phi")
-    )
-    modelled: np.ndarray | None = None
+    rows = [c for c, name in enumerate(stack.channels) if not is_ratio(name)]
+    weights = 1.0 / stack.std[rows] ** 2
+    gains = np.empty((len(stack), len(materials)))
     for c, material in enumerate(materials):
-        for b, one in enumerate(data):
-            if modelled is None or not shared or b == 0:
-                found = predict(material.space, material.mean, one, names)
-                modelled = np.stack([found[name] for name in names])
-            weights = 1.0 / one.std[rows] ** 2
-            along = (weights * modelled * one.values[rows]).sum()
-            gains[b, c] = max(along / (weights * modelled**2).sum(), 1e-12)
+        modelled = _mean_shown(material, stack, [stack.channels[c] for c in rows])
+        along = (weights * modelled * stack.values[rows]).sum(axis=(0, 1))
+        gains[:, c] = np.maximum(along / (weights * modelled**2).sum(axis=(0, 1)), 1e-12)
     return np.log(gains)
+
+
+def _mean_shown(material: Material, stack: Stack, channels: Sequence[str]) -> np.ndarray:
+    """What the mean specimen shows, shape (C, G, 1) where all measurements share their geometries, else (C, G, B)."""
+    import drjit as dr
+
+    backend = get_backend()
+    Float, UInt32 = backend.Float, backend.UInt32
+    points, width = stack.theta_i.shape
+    lane = dr.arange(UInt32, points * width)
+    point = lane // dr.opaque(UInt32, width)
+    u = [dr.opaque(Float, float(x)) for x in material.mean]
+    number = lane - point * dr.opaque(UInt32, width)
+    values, _ = signals_of(material.space, stack)(u, number, point, channels)
+    arrays = [Float(value) + dr.zeros(Float, points * width) for value in values]
+    dr.eval(arrays)
+    return np.stack([array.numpy().reshape(points, width) for array in arrays])
 
 
 def _of_one_model(
     materials: Sequence[Material],
-    data: Sequence[Observations],
+    stack: Stack,
     start_gain: np.ndarray | None,
     centre_gain: np.ndarray | None,
     angle: float | None,
@@ -239,12 +271,11 @@ def _of_one_model(
 
     backend = get_backend()
     Float, UInt32 = backend.Float, backend.UInt32
-    batch, count = len(data), len(materials)
+    batch, count = len(stack), len(materials)
     space = materials[0].space
     size = len(space.free)
     nuisances = _nuisances(start_gain is not None, angle)
     space = _with_nuisances(space, nuisances)
-    stack = Stack.of(data)
     misfit = misfits(space, stack, accuracy, Float)
     low, high = materials[0].space.box
     means = [backend.upload(Float, np.array([m.mean[i] for m in materials])) for i in range(size)]

@@ -31,8 +31,6 @@ BEYOND, FARTHER = 1e-6, 40.0
 #: The tables' squared errors in units of the data's, summed, are no more than this part of the spread of the distance,
 #: which is √(2 D) for D data; else the model itself is evaluated. Judged by so many pixels.
 TOLERATED, JUDGES = 0.1, 1000
-#: Pixels for which a model is evaluated together.
-TOGETHER = 1 << 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,13 +146,9 @@ class SharedGeometry:
     ) -> tuple[np.ndarray, np.ndarray]:
         if not len(pixel):
             return np.empty(0), np.empty(0)
-        log_evidence, distance = np.empty(len(pixel)), np.empty(len(pixel))
-        for begin in range(0, len(pixel), TOGETHER):
-            part = slice(begin, begin + TOGETHER)
-            data = [replace(self.like, values=values[n], std=std[n]) for n in pixel[part]]
-            found = evidence([self.emulators[kind[0]].material], data, gain=self.gain)
-            log_evidence[part], distance[part] = found.log_evidence[:, 0], found.distance[:, 0]
-        return log_evidence, distance
+        data = [replace(self.like, values=values[n], std=std[n]) for n in pixel]
+        found = evidence([self.emulators[kind[0]].material], data, gain=self.gain)
+        return found.log_evidence[:, 0], found.distance[:, 0]
 
     def _solved(
         self,

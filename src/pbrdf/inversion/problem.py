@@ -368,9 +368,10 @@ def _at_points(space: Space, unknowns: np.ndarray, data: Observations) -> tuple[
     return space.blocks.at(unknowns, place), place
 
 
-def signals_of(space: Space, data: Sequence[Observations], accuracy: str | None = None) -> Any:
+def signals_of(space: Space, data: Sequence[Observations] | Stack, accuracy: str | None = None) -> Any:
     """``f(u, number, point, channels)``: channels modelled at a point of a data set, and what else was computed."""
-    return _Signals(space, Stack.of(data), accuracy, get_backend().Float)
+    stack = data if isinstance(data, Stack) else Stack.of(data)
+    return _Signals(space, stack, accuracy, get_backend().Float)
 
 
 class _Signals:

@@ -17,7 +17,6 @@ from pbrdf.data.schema import (
     COVARIANCE,
     DIMENSION,
     STOKES_AXES,
-    VARIABLES,
     std_name,
     variable_dims,
 )
@@ -26,6 +25,7 @@ from pbrdf.errors import DataError, FitError
 from pbrdf.inversion.noise import Noise, parse_noise
 from pbrdf.inversion.nuisance import Nuisance
 from pbrdf.inversion.observations import Observations, noise_in_words
+from pbrdf.inversion.parameter_map.block_stack import ANGLES, MEASURED, stack_of_block
 from pbrdf.inversion.parameter_map.ends import Ends, Pixels
 from pbrdf.inversion.parameter_map.layout import PixelStatus, broadcast_map, empty_map, template
 from pbrdf.inversion.parameter_map.search import fit_pixels
@@ -52,8 +52,6 @@ LAYOUT = 1
 #: Pixels of a label from which the shared parameters' starting values are found, and values between their bounds that
 #: are tried where single pixels tell nothing.
 FEW, BEGINNINGS = 24, 16
-_ANGLES = ("theta_i", "theta_r", "phi")
-_MEASURED = {*VARIABLES, *map(std_name, VARIABLES), COVARIANCE}
 
 
 @dataclass(frozen=True, eq=False)
@@ -424,7 +422,10 @@ max_iterations, share, correlation
         shape = [block.sizes[d] for d in self.dims]
         label = self._labels(block).ravel()
         wanted = label != 0
-        stack = self._stack(block) if wanted.any() else None
+        stack = None
+        if wanted.any():
+            given = {name: self._given[name] for name in ("noise", "objective", "covariance")}
+            stack = stack_of_block(block, self.dims, **given)
         count = np.zeros(len(label), dtype=int) if stack is None else stack.count
         freedom = count - self._own
         few = wanted & (count > 0) & (freedom <= 0)
@@ -517,42 +518,6 @@ max_iterations, share, correlation
             label = np.where(block[MASK].transpose(*self.dims).values != 0, label, 0)
         return label
 
-    def _stack(self, block: xr.Dataset) -> Stack | None:
-        """What was measured at the pixels of a block; None where nothing was."""
-        shape = tuple(block.sizes[d] for d in self.dims)
-        angles = {name: _columns(block[name].variable, self.dims, shape, shared=True) for name in _ANGLES}
-        for name in _ANGLES[:2]:
-            shared = angles[name]
-            if shared.shape[1] == 1 and not ((shared >= 0.0) & (shared < 0.5 * np.pi)).all():
-                raise DataError(
-                    f"{name} of a geometry that all pixels share is not in [0°, 90°): give radians, and leave the "
-                    "geometry out where there is no direction"
-                )
-        wide = max(values.shape[1] for values in angles.values())
-        if wide > 1:
-            angles = {n: np.broadcast_to(v, (len(v), wide)) for n, v in angles.items()}
-        columns = {
-            name: _columns(block[name].variable, self.dims, shape)
-            for name in map(str, block.data_vars)
-            if name in _MEASURED
-        }
-        try:
-            return Stack.from_columns(
-                columns,
-                angles,
-                block.attrs["quantity"],
-                block.attrs["illumination"],
-                noise=self._given["noise"],
-                objective=self._given["objective"],
-                covariance=self._given["covariance"],
-                group=block["group"].values,
-                wavelength=block["wavelength"].values if "wavelength" in block.coords else None,
-            )
-        except FitError:
-            if any(np.isfinite(columns[name]).any() for name in columns if name in VARIABLES):
-                raise
-            return None
-
 
 @dataclass(frozen=True, eq=False)
 class _Part:
@@ -589,28 +554,9 @@ class _Part:
         )
 
 
-def _columns(
-    variable: xr.Variable, dims: Sequence[str], shape: tuple[int, ...], *, shared: bool = False
-) -> np.ndarray:
-    """Values of a variable with the geometries first and the pixels last, shape (…, G, B).
-
-    With ``shared``, (G, 1) where all pixels share them.
-    """
-    here = [d for d in dims if d in variable.dims]
-    front = [d for d in variable.dims if d not in (*dims, DIMENSION)]
-    values = np.asarray(variable.transpose(*front, DIMENSION, *here).values)
-    head = values.shape[: values.ndim - len(here)]
-    if shared and not here:
-        return values[..., None]
-    if len(here) < len(dims):
-        sizes = [n if d in here else 1 for d, n in zip(dims, shape, strict=True)]
-        values = np.broadcast_to(values.reshape(*head, *sizes), (*head, *shape))
-    return values.reshape(*head, -1)
-
-
 def _image_dims(dataset: xr.Dataset, labels: str | None) -> tuple[str, ...]:
     """The dimensions beside ``geometry``; DataError where there are none, or variables do not go with them."""
-    used = {str(d) for name in map(str, dataset.data_vars) if name in _MEASURED for d in dataset[name].dims}
+    used = {str(d) for name in map(str, dataset.data_vars) if name in MEASURED for d in dataset[name].dims}
     dims = tuple(str(d) for d in dataset.sizes if d in used and d not in (DIMENSION, *STOKES_AXES))
     if not dims:
         raise DataError(
@@ -644,7 +590,7 @@ def _form(dataset: xr.Dataset, dims: Sequence[str]) -> xr.Dataset:
     for name in map(str, dataset.variables):
         variable = dataset.variables[name]
         own = tuple(map(str, (d for d in variable.dims if d not in dims)))
-        if name in _MEASURED:
+        if name in MEASURED:
             wanted = variable_dims(name)
             if set(own) != set(wanted):
                 raise DataError(
@@ -656,7 +602,7 @@ def _form(dataset: xr.Dataset, dims: Sequence[str]) -> xr.Dataset:
                 known = [n in dataset.data_vars and std_name(n) in dataset.data_vars for n in STOKES]
                 ones[:] = np.where(np.outer(known, known), np.eye(4), np.nan)
             variables[name] = (wanted, ones)
-        elif name in _ANGLES and len(own) < len(variable.dims):
+        elif name in ANGLES and len(own) < len(variable.dims):
             if own != (DIMENSION,):
                 raise DataError(
                     f"{name} has the dimensions {variable.dims}: it needs {DIMENSION!r} among them"
@@ -675,7 +621,7 @@ def _form(dataset: xr.Dataset, dims: Sequence[str]) -> xr.Dataset:
     form = xr.Dataset(coords=coords, attrs=plain_attributes(dataset.attrs))
     # beside each other, not aligned: the schema is to judge them
     for name, (at, values) in variables.items():
-        form[name] = (at, values) if name in _MEASURED else ((), 0.0)
+        form[name] = (at, values) if name in MEASURED else ((), 0.0)
     validate(form)
     return form
 
