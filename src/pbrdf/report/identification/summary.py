@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator
+from collections.abc import Container, Sequence
 from typing import TYPE_CHECKING
 
 from pbrdf.report.dataset.describe import short_name
@@ -25,7 +25,7 @@ from pbrdf.report.identification.subject import HEADINGS, Identified, rests_on, 
 from pbrdf.report.printing import bare_table, print_parts, printing_console
 
 if TYPE_CHECKING:
-    from rich.console import Console, RenderableType
+    from rich.console import Console
 
 __all__ = ["print_calibration", "print_classes", "print_summary", "summary_text"]
 
@@ -34,7 +34,24 @@ _TEXT_WIDTH = 120
 
 def print_summary(report: Identified, console: Console) -> None:
     """Print the set, the table of candidates, and the sentences."""
-    print_parts(_parts(report), console)
+    name = short_name(report.name, report.dataset)
+    heading = f"{name}: {sentence(report.found)}"
+    _print(heading, HEADINGS, (1, 2), rows_of(report.found), rests_on(report), console)
+
+
+def print_classes(report: Classified, console: Console) -> None:
+    """Print how many pixels show which material, and what that rests on."""
+    heading = f"{report.name}: {classes_sentence(report)}"
+    numeric = range(1, len(CLASS_HEADINGS))
+    _print(heading, CLASS_HEADINGS, numeric, class_rows(report), classes_rest_on(report), console)
+
+
+def print_calibration(report: Calibrated, console: Console) -> None:
+    """Print coverage and confusion by material, the calibration error, and what they rest on."""
+    heading = f"{report.name}: {calibrated_sentence(report)}"
+    numeric = range(1, len(CALIBRATION_HEADINGS))
+    rows = calibration_rows(report)
+    _print(heading, CALIBRATION_HEADINGS, numeric, rows, calibration_rests_on(report), console)
 
 
 def summary_text(report: Identified | Classified | Calibrated) -> str:
@@ -50,56 +67,20 @@ def summary_text(report: Identified | Classified | Calibrated) -> str:
     return "\n".join(line.rstrip() for line in file.getvalue().splitlines()) + "\n"
 
 
-def _parts(report: Identified) -> Iterator[RenderableType]:
+def _print(
+    heading: str,
+    columns: Sequence[str],
+    numeric: Container[int],
+    rows: Sequence[Sequence[str]],
+    lines: Sequence[str],
+    console: Console,
+) -> None:
+    """A sentence, a table and what both rest on."""
     from rich.text import Text
 
-    yield f"{short_name(report.name, report.dataset)}: {sentence(report.found)}"
-    yield ""
     table = bare_table()
-    for k, heading in enumerate(HEADINGS):
-        table.add_column(heading, justify="right" if k in (1, 2) else "left")
-    for row in rows_of(report.found):
+    for k, column in enumerate(columns):
+        table.add_column(column, justify="right" if k in numeric else "left")
+    for row in rows:
         table.add_row(*map(Text, row))
-    yield table
-    yield ""
-    yield from rests_on(report)
-
-
-def print_classes(report: Classified, console: Console) -> None:
-    """Print how many pixels show which material, and what that rests on."""
-    print_parts(_classes(report), console)
-
-
-def print_calibration(report: Calibrated, console: Console) -> None:
-    """Print coverage and confusion by material, the calibration error, and what they rest on."""
-    print_parts(_calibration(report), console)
-
-
-def _classes(report: Classified) -> Iterator[RenderableType]:
-    from rich.text import Text
-
-    yield f"{report.name}: {classes_sentence(report)}"
-    yield ""
-    table = bare_table()
-    for k, heading in enumerate(CLASS_HEADINGS):
-        table.add_column(heading, justify="right" if k else "left")
-    for row in class_rows(report):
-        table.add_row(*map(Text, row))
-    yield table
-    yield ""
-    yield from classes_rest_on(report)
-
-
-def _calibration(report: Calibrated) -> Iterator[RenderableType]:
-    from rich.text import Text
-
-    yield f"{report.name}: {calibrated_sentence(report)}"
-    yield ""
-    table = bare_table()
-    for k, heading in enumerate(CALIBRATION_HEADINGS):
-        table.add_column(heading, justify="right" if k else "left")
-    for row in calibration_rows(report):
-        table.add_row(*map(Text, row))
-    yield table
-    yield ""
-    yield from calibration_rests_on(report)
+    print_parts([heading, "", table, "", *lines], console)
