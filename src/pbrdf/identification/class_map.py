@@ -18,7 +18,7 @@ import numpy as np
 
 from pbrdf.data.schema import DIMENSION, STOKES_AXES, VARIABLES
 from pbrdf.errors import DataError, FitError
-from pbrdf.identification.conformal import Calibration, nominal, probabilities
+from pbrdf.identification.conformal import Calibration, nominal, probabilities, told
 from pbrdf.identification.identify import check_request, shares, unknown_gain
 from pbrdf.identification.library import Library
 from pbrdf.identification.pixels import of_parameters, of_stokes
@@ -188,18 +188,15 @@ class _Judged:
         known = np.isfinite(p).all(axis=0)
         if not known.any():
             return
-        found = probabilities(self.probability[here][:, known].T.astype(float), share, temperature).T
-        inside = p[:, known] > 1.0 - confidence
-        best = np.where(inside, found, -1.0).argmax(axis=0)
-        some = inside.any(axis=0)
-        chosen = np.take_along_axis(found, best[None], axis=0)[0]
-        for target, values in (
-            (self.material[place], np.where(some, best, NONE_OF_THESE)),
-            (self.confidence[place], np.where(some, chosen, np.nan)),
-        ):
-            target[known] = values
-        self.in_set[here][:, known] = inside
-        self.probability[here][:, known] = found
+        found = probabilities(self.probability[here][:, known].T.astype(float), share, temperature)
+        inside = 1.0 - confidence < p[:, known].T
+        best = told(found, inside)
+        some = best < found.shape[1]
+        chosen = np.append(found, np.full((len(found), 1), np.nan), axis=1)[np.arange(len(found)), best]
+        self.material[place][known] = np.where(some, best, NONE_OF_THESE)
+        self.confidence[place][known] = chosen
+        self.in_set[here][:, known] = inside.T
+        self.probability[here][:, known] = found.T
 
 
 def _dataset(

@@ -26,6 +26,7 @@ __all__ = [
     "nominal",
     "probabilities",
     "reliability",
+    "told",
 ]
 
 #: Temperatures among which the one is taken that makes labelled measurements most probable.
@@ -52,6 +53,18 @@ def probabilities(
             logit = logit + np.log(prior)
     weight = np.exp(logit - logit.max(axis=1, keepdims=True))
     return np.asarray(weight / weight.sum(axis=1, keepdims=True))
+
+
+def told(probability: np.ndarray, inside: np.ndarray) -> np.ndarray:
+    """Number of the most probable material of each set, the number of materials where the set is empty, shape (B,).
+
+    Parameters
+    ----------
+    probability, inside
+        Of the materials, and whether they belong to the set; shape (B, C) each.
+    """
+    best = np.where(inside, probability, -1.0).argmax(axis=1)
+    return np.where(inside.any(axis=1), best, inside.shape[1])
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pbrdf.errors import FitError
-from pbrdf.identification.conformal import Reliability, reliability
+from pbrdf.identification.conformal import Reliability, reliability, told
 from pbrdf.identification.identify import Identification
 
 __all__ = ["NONE", "Confusion", "confusion"]
@@ -85,17 +85,16 @@ def confusion(identifications: Sequence[Identification], truth: Sequence[str]) -
     rows = (*(name for name in names if name in truth), *strangers)
     counts = np.zeros((len(rows), len(taken_for)), dtype=int)
     right, size = np.zeros(len(rows)), np.zeros(len(rows))
-    for one, name in zip(identifications, truth, strict=True):
-        row = rows.index(name)
-        found = one.materials
-        counts[row, taken_for.index(found[0] if found else NONE)] += 1
-        right[row] += name in found if name in names else one.none_of_these
-        size[row] += len(found)
+    row = np.array([rows.index(name) for name in truth])
+    probability = np.array([[one[name].probability for name in names] for one in identifications])
+    inside = np.array([[one[name].accepted for name in names] for one in identifications])
+    np.add.at(counts, (row, told(probability, inside)), 1)
+    true = np.array([names.index(name) if name in names else -1 for name in truth])
+    held = np.where(true < 0, ~inside.any(axis=1), inside[np.arange(len(true)), true])
+    np.add.at(right, row, held)
+    np.add.at(size, row, inside.sum(axis=1))
     count = counts.sum(axis=1)
-    known = [
-        (one, names.index(name)) for one, name in zip(identifications, truth, strict=True) if name in names
-    ]
-    probability = np.array([[one[name].probability for name in names] for one, _ in known])
+    known = true >= 0
     return Confusion(
         truth=rows,
         taken_for=taken_for,
@@ -103,5 +102,5 @@ def confusion(identifications: Sequence[Identification], truth: Sequence[str]) -
         coverage=right / count,
         set_size=size / count,
         confidence=confidence,
-        reliability=reliability(probability, np.array([place for _, place in known])) if known else None,
+        reliability=reliability(probability[known], true[known]) if known.any() else None,
     )

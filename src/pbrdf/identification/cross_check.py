@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pbrdf.identification.conformal import Reliability, calibrate, probabilities, reliability
+from pbrdf.identification.conformal import Reliability, calibrate, probabilities, reliability, told
 
 __all__ = ["Judged", "cross_checked"]
 
@@ -59,11 +59,8 @@ class Judged:
 
         What is told is the most probable material of the set.
         """
-        inside = self.p_value > 1.0 - confidence
-        told = np.where(inside, self.probability, -1.0).argmax(axis=1)
-        told = np.where(inside.any(axis=1), told, len(self.names))
         matrix = np.zeros((len(self.names), len(self.names) + 1), dtype=int)
-        np.add.at(matrix, (self.truth, told), 1)
+        np.add.at(matrix, (self.truth, told(self.probability, self.p_value > 1.0 - confidence)), 1)
         return matrix
 
 

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -32,9 +31,6 @@ __all__ = [
     "shares",
     "unknown_gain",
 ]
-
-#: Standard deviation of an unknown offset of the sample's angle, radians (docs/fitting.md, nuisance terms).
-ANGLE_OFFSET = math.radians(0.2)
 
 
 @dataclass(frozen=True)
@@ -281,18 +277,26 @@ def labelled_evidence(
         raise FitError("calibration: there are no labelled measurements")
     if isinstance(noise, str):
         noise = parse_noise(noise)
-    truth = [library.names.index(library[name].name) for name, _ in labelled]
-    rows, scores = [], []
-    for number, (_, dataset) in enumerate(labelled, start=1):
+    truth = np.array([library.names.index(library[name].name) for name, _ in labelled])
+    # those of one form are looked at together
+    alike: dict[Any, list[tuple[int, Observations]]] = {}
+    for number, (_, dataset) in enumerate(labelled):
         validate(dataset)
         observed = Observations.from_dataset(dataset, noise)
         free = unknown_gain(dataset) if gain is None else gain
-        found = evidence(library.materials, [observed], gain=free, angle=angle)
-        rows.append(found.log_evidence[0])
-        scores.append(nominal(found.distance, found.degrees_of_freedom)[0])
+        form = observed.channels, observed.values.shape, observed.illumination, free
+        alike.setdefault(form, []).append((number, observed))
+    log_evidence = np.empty((len(labelled), len(library.materials)))
+    scores, done = np.empty_like(log_evidence), 0
+    for (*_, free), members in alike.items():
+        at = [number for number, _ in members]
+        found = evidence(library.materials, [one for _, one in members], gain=free, angle=angle)
+        log_evidence[at] = found.log_evidence
+        scores[at] = nominal(found.distance, found.degrees_of_freedom)
+        done += len(members)
         if progress is not None:
-            progress(number, len(labelled))
-    return np.array(rows), np.array(scores), np.array(truth)
+            progress(done, len(labelled))
+    return log_evidence, scores, truth
 
 
 def check_request(library: Library, confidence: float) -> None:
