@@ -171,7 +171,7 @@ def test_the_workers_of_a_scheduler_fill_what_one_process_fills(at_trial, tmp_pa
     distributed = pytest.importorskip("distributed")
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join(filter(None, sys.path)))
     with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=50
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0", silence_logs=50
     ) as cluster:
         at_trial(
             "map", "trial/reduced/stokes.zarr", "-g", "flat", "-o", "paint.zarr", *FIT, "--unit", 8,

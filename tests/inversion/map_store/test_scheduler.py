@@ -29,7 +29,7 @@ pytestmark = [
 
 def cluster(monkeypatch, **options):
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join(filter(None, sys.path)))
-    options = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": None} | options
+    options = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": ":0"} | options
     return distributed.LocalCluster(processes=True, silence_logs=50, **options)
 
 
