@@ -133,6 +133,9 @@ def sample_picture(stokes: xr.Dataset) -> tuple[np.ndarray, int]:
     DataError
         If nothing was measured anywhere.
     """
+    # here, as most geometries look for nothing in a picture
+    from pbrdf.instruments.reduction.stokes_image import PixelFlag
+
     rows, columns = stokes.sizes["y"], stokes.sizes["x"]
     step = max(1, math.ceil(math.sqrt(rows * columns / _MOST_PIXELS)))
     brightest = np.full((rows // step, columns // step), -np.inf)
@@ -148,8 +151,9 @@ def sample_picture(stokes: xr.Dataset) -> tuple[np.ndarray, int]:
             mean = np.nansum(values, axis=(1, 3)) / np.maximum(count, 1)
             brightest[part] = np.fmax(brightest[part], np.where(count > 0, mean, np.nan))
             if "flags" in one:
-                # PixelFlag.SATURATED
-                saturated[part] |= ((_blocks(block["flags"], step) & 1) != 0).any(axis=(1, 3))
+                saturated[part] |= ((_blocks(block["flags"], step) & PixelFlag.SATURATED) != 0).any(
+                    axis=(1, 3)
+                )
     found = np.isfinite(brightest)
     if not found.any():
         raise DataError("no pixel was measured: there is nothing to find in the picture")
