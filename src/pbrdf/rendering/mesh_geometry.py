@@ -130,15 +130,20 @@ class MeshGeometry(CurvedSample):
             light, _ = lamp.seen_from(surface.point)
             facing = (light * surface.normal).sum(-1) > 0.0
             seen = surface.seen & facing
-            seen[seen] &= ~_shaded(scene, surface, seen, lamp, axes, middle)
+            seen[seen] &= ~_shaded(scene, surface, seen, lamp, light, axes, middle)
             yield LitSurface(surface._replace(seen=seen), lamp)
 
 
 def _shaded(
-    scene: Any, surface: Surface, where: np.ndarray, lamp: Lamp, axes: np.ndarray, middle: np.ndarray
+    scene: Any,
+    surface: Surface,
+    where: np.ndarray,
+    lamp: Lamp,
+    light: np.ndarray,
+    axes: np.ndarray,
+    middle: np.ndarray,
 ) -> np.ndarray:
-    """Whether the mesh stands between the lamp and its own points."""
-    light, _ = lamp.seen_from(surface.point)
+    """Whether the mesh stands between the lamp, whose direction is `light`, and its own points."""
     direction = np.broadcast_to(light, surface.point.shape)[where] @ axes
     extent = _extent(scene)
     # away from the surface by what single precision leaves open

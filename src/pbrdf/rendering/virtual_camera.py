@@ -16,7 +16,7 @@ from pbrdf.errors import DataError
 from pbrdf.instruments.frames.frames import ArrayFrames, Frames
 from pbrdf.instruments.frames.mosaic import MosaicFrames
 from pbrdf.instruments.goniometer.rays import angles_of
-from pbrdf.instruments.pixel_geometry.geometry import plane_rotation
+from pbrdf.instruments.pixel_geometry.geometry import MAX_ZENITH, plane_rotation
 from pbrdf.instruments.polarimeter.instrument import Instrument
 from pbrdf.instruments.reduction.stokes_image import StokesImage
 from pbrdf.instruments.reduction.surface_axes import to_surface_axes
@@ -172,7 +172,7 @@ def pixel_dataset(
     exposure: float,
     intensity: float,
     shape: str | None = None,
-    max_zenith: float = np.deg2rad(80.0),
+    max_zenith: float = MAX_ZENITH,
     every: int = 1,
     attrs: Mapping[str, Any] | None = None,
 ) -> xr.Dataset:

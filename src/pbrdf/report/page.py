@@ -8,12 +8,16 @@ into one another as they are.
 from __future__ import annotations
 
 import base64
+import platform
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
+from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
+
+from pbrdf.version import __version__
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -26,13 +30,16 @@ __all__ = [
     "command",
     "embedded_picture",
     "figure",
+    "file_list",
     "holds",
+    "in_words",
     "markup",
     "paragraph",
     "render_page",
     "subheading",
     "table",
     "terms",
+    "versions",
 ]
 
 #: Look of a verdict by words in its level: what is worth most is looked for last.
@@ -206,6 +213,27 @@ def table(
         ``fixed``.
     """
     return _piece("table", caption, headings, [_spans(row) for row in rows], list(numeric), list(classes))
+
+
+def file_list(files: Iterable[str]) -> Markup:
+    """Links to the files beside the page, by their names."""
+    links = markup(" · ").join(markup('<a href="{}">{}</a>', name, name) for name in files)
+    return markup("<p>Files beside this page: {}</p>", links)
+
+
+def versions(packages: Iterable[str]) -> str:
+    """The versions of pbrdf, Python and packages."""
+    own = [f"pbrdf {__version__}", f"Python {platform.python_version()}"]
+    return ", ".join([*own, *(f"{name} {version(name)}" for name in packages)])
+
+
+def in_words(value: object) -> str:
+    """A setting's value as text: of mappings and sequences what is in them."""
+    if isinstance(value, Mapping):
+        return ", ".join(f"{k} = {in_words(v)}" for k, v in value.items())
+    if isinstance(value, list | tuple):
+        return ", ".join(map(in_words, value))
+    return str(value)
 
 
 def markup(template: str, *values: Any) -> Markup:

@@ -11,10 +11,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["FLATTEST", "STEEPEST", "Margins", "beside", "picture_grid"]
+__all__ = ["Margins", "beside", "panel_height", "picture_grid"]
 
 #: Height over width of a panel, at least and at most, whatever the picture's proportions are.
-FLATTEST, STEEPEST = 0.25, 2.0
+_FLATTEST, _STEEPEST = 0.25, 2.0
 
 
 @dataclass(frozen=True)
@@ -27,6 +27,11 @@ class Margins:
     bottom: float
     across: float
     down: float
+
+
+def panel_height(shape: tuple[int, int]) -> float:
+    """Height over width of the panel of a picture with so many rows and columns."""
+    return min(max(shape[0] / shape[1], _FLATTEST), _STEEPEST)
 
 
 def picture_grid(
@@ -63,7 +68,7 @@ def picture_grid(
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    high = width * min(max(shape[0] / shape[1], FLATTEST), STEEPEST)
+    high = width * panel_height(shape)
     m = margins
     group = rows * high + (rows - 1) * m.down
     size = (

@@ -65,6 +65,15 @@ def test_size_and_distance_have_one_unit():
     np.testing.assert_allclose(scaled.irradiance, near.irradiance, rtol=1e-12)
 
 
+def test_only_lamps_that_are_near_have_an_irradiance():
+    ball = {"x": 30.0, "y": 30.0, "r": 20.0}
+    assert "irradiance" not in Sphere(**ball, lamps=[Lamp(0.5)]).of(blank(60, 60))
+    both = Sphere(**ball, lamps=[Lamp(0.5), Lamp(0.5, 0.0, 3.0)]).of(blank(60, 60, 2))
+    assert (
+        float(both.irradiance.isel(geometry=0).max()) == 1.0 < float(both.irradiance.isel(geometry=1).max())
+    )
+
+
 @pytest.mark.parametrize("camera", [PixelCamera(), PERSPECTIVE], ids=["orthographic", "perspective"])
 @pytest.mark.parametrize(("lamps", "close"), [(TWO, 0.05), ([SIDE], 0.1), ([Lamp(1.3, 2.0)], 0.1)])
 def test_it_is_found(camera, lamps, close):

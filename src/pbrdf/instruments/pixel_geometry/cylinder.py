@@ -149,8 +149,7 @@ def _from_edges(bar: Bar, camera: PixelCamera) -> tuple[float, float, float, flo
     # half the angle between the planes, whose normals point inwards
     half = math.atan2(np.linalg.norm(planes[0] + planes[1]), np.linalg.norm(middle))
     # of the rays in the plane that halves the angle, the one nearest to the middle of what was found
-    across_plane = middle / np.linalg.norm(middle)
-    ray = inside - (inside @ across_plane) * across_plane
+    ray = across(inside, middle / np.linalg.norm(middle))
     x, y = camera.place(ray / np.linalg.norm(ray))
     focal = camera.focal or math.nan
     return (

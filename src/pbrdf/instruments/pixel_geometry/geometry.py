@@ -201,6 +201,7 @@ def lit_angles(
 ) -> xr.Dataset:
     """Angles and axes from vectors; see :meth:`PixelGeometry.pixels` for what is given and returned."""
     found: dict[str, list[np.ndarray]] = {}
+    near = False
     for surface, lamp in series:
         source, irradiance = lamp.seen_from(surface.point)
         theta_i, theta_r, phi = angles_of(surface.normal, source, surface.view)
@@ -208,10 +209,11 @@ def lit_angles(
         values = {"theta_i": theta_i, "theta_r": theta_r, "phi": phi}
         values["rotation"] = plane_rotation(surface.normal, surface.view, source)
         values["irradiance"] = np.ones(()) if irradiance is None else irradiance
+        near |= irradiance is not None
         for name, value in values.items():
             found.setdefault(name, []).append(np.where(mask, value, np.nan))
         found.setdefault("mask", []).append(mask)
-    if all((one == 1.0).all() or np.isnan(one).all() for one in found["irradiance"]):
+    if not near:
         del found["irradiance"]
     return stacked(found, x, y, attrs)
 

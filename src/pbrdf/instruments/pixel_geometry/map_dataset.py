@@ -280,8 +280,7 @@ def _pixels_alone(
 ) -> xr.Dataset:
     """A block without what is the same in all of them."""
     found = map_block(stokes, geometry, scale=scale).reset_coords(_ANGLES)
-    found = found.drop_vars([name for name, v in found.variables.items() if not {"y", "x"} & set(v.dims)])
-    return found.drop_vars([name for name in found.data_vars if not {"y", "x"} <= set(found[name].dims)])
+    return found.drop_vars([name for name, v in found.variables.items() if not {"y", "x"} & set(v.dims)])
 
 
 def _require_sizes(geometry: xr.Dataset, stokes: xr.Dataset) -> None:

@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -132,6 +133,9 @@ def sample_picture(stokes: xr.Dataset) -> tuple[np.ndarray, int]:
     DataError
         If nothing was measured anywhere.
     """
+    # here, as most geometries look for nothing in a picture
+    from pbrdf.instruments.reduction.stokes_image import PixelFlag
+
     rows, columns = stokes.sizes["y"], stokes.sizes["x"]
     step = max(1, math.ceil(math.sqrt(rows * columns / _MOST_PIXELS)))
     brightest = np.full((rows // step, columns // step), -np.inf)
@@ -147,8 +151,9 @@ def sample_picture(stokes: xr.Dataset) -> tuple[np.ndarray, int]:
             mean = np.nansum(values, axis=(1, 3)) / np.maximum(count, 1)
             brightest[part] = np.fmax(brightest[part], np.where(count > 0, mean, np.nan))
             if "flags" in one:
-                # PixelFlag.SATURATED
-                saturated[part] |= ((_blocks(block["flags"], step) & 1) != 0).any(axis=(1, 3))
+                saturated[part] |= ((_blocks(block["flags"], step) & PixelFlag.SATURATED) != 0).any(
+                    axis=(1, 3)
+                )
     found = np.isfinite(brightest)
     if not found.any():
         raise DataError("no pixel was measured: there is nothing to find in the picture")
@@ -211,7 +216,7 @@ def find_bar(stokes: xr.Dataset) -> Bar:
         lines = _sampled_lines(points)
         if lines is None:
             continue
-        close = [np.abs(points @ line[:2] - line[2]) < 1.5 for line in lines]
+        close = [np.abs(_inside(line, points)) < 1.5 for line in lines]
         share = (close[0] | close[1]).mean()
         # nothing may lie outside of the two edges, and they must not be those of something else
         rows, columns = np.nonzero(part)
@@ -220,7 +225,7 @@ def find_bar(stokes: xr.Dataset) -> Bar:
         if share < 0.5 or between < _INSIDE:
             continue
         length = min(c.sum() for c in close)
-        width = abs(points[close[1]].mean(axis=0) @ lines[0][:2] - lines[0][2])
+        width = abs(_inside(lines[0], points[close[1]].mean(axis=0)))
         if width < 2.0 * _LEAST_RADIUS:
             continue
         found.append((share * between * math.sqrt(length * width), lines, points, part, values))
@@ -255,7 +260,7 @@ def _parts(values: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
             sizes = np.bincount(marks.ravel())[1:]
             for i in np.argsort(sizes)[::-1][:_PARTS]:
                 part = ndimage.binary_fill_holes(marks == i + 1)
-                if part is not None and part.sum() >= 50:
+                if part.sum() >= 50:
                     yield part, signed
 
 
@@ -282,9 +287,9 @@ def _outline(part: np.ndarray) -> np.ndarray:
     return np.stack([columns, rows], axis=-1).astype(float)
 
 
-def _tolerance(radius: float) -> float:
-    """How far from the circle an outline pixel may lie."""
-    return max(1.2, 0.01 * radius)
+def _tolerance(radius: Any) -> Any:
+    """How far from the circle an outline pixel may lie, of one radius or of several."""
+    return np.maximum(1.2, 0.01 * radius)
 
 
 def _distance(circle: np.ndarray, points: np.ndarray) -> np.ndarray:
@@ -319,7 +324,7 @@ def _sampled_circle(points: np.ndarray, part: np.ndarray) -> np.ndarray | None:
     circles = np.concatenate([centre, radius[:, None]], axis=-1)[usable]
     # the border of a shadow lies inside of the outline: of circles with as many points the one around the others
     off = np.hypot(thin[:, 0] - circles[:, :1], thin[:, 1] - circles[:, 1:2]) - circles[:, 2:]
-    limit = np.maximum(1.2, 0.01 * circles[:, 2:])
+    limit = _tolerance(circles[:, 2:])
     votes = (np.abs(off) < limit).sum(-1) - (off > limit).sum(-1)
     circle = circles[np.argmax(votes)]
     for _ in range(5):
@@ -447,11 +452,11 @@ def _precise_circle(
         axis = np.array([fit.x[0], fit.x[1], 1.0])
         x, y = camera.place(axis / np.linalg.norm(axis))
         r = focal * math.tan(float(fit.x[2]))
-    residual = fit.fun[np.abs(fit.fun) < 1.0 * scale]
-    if len(residual) < 12:
+    close = np.abs(fit.fun) < scale
+    if close.sum() < 12:
         return None
-    arc = _arc(np.array([x, y, r]), points[np.abs(fit.fun) < 1.0 * scale])
-    return Circle(x, y, r, arc, float(np.sqrt(np.mean(residual**2))))
+    arc = _arc(np.array([x, y, r]), points[close])
+    return Circle(x, y, r, arc, float(np.sqrt(np.mean(fit.fun[close] ** 2))))
 
 
 def _sampled_lines(points: np.ndarray) -> list[np.ndarray] | None:
@@ -477,17 +482,22 @@ def _sampled_lines(points: np.ndarray) -> list[np.ndarray] | None:
         votes = (np.abs(rest @ normal.T - level) < 1.2).sum(0)
         line = np.array([*normal[np.argmax(votes)], level[np.argmax(votes)]])
         for _ in range(3):
-            close = np.abs(rest @ line[:2] - line[2]) < 1.5
+            close = np.abs(_inside(line, rest)) < 1.5
             if close.sum() < 6:
                 return None
             line = _line(rest[close])
         lines.append(line)
-        rest = rest[np.abs(rest @ line[:2] - line[2]) > 3.0]
+        rest = rest[np.abs(_inside(line, rest)) > 3.0]
     first, second = lines
-    near = [points[np.abs(points @ line[:2] - line[2]) < 1.5].mean(axis=0) for line in lines]
-    first *= np.sign(near[1] @ first[:2] - first[2])
-    second *= np.sign(near[0] @ second[:2] - second[2])
+    near = [points[np.abs(_inside(line, points)) < 1.5].mean(axis=0) for line in lines]
+    first *= np.sign(_inside(first, near[1]))
+    second *= np.sign(_inside(second, near[0]))
     return [first, second]
+
+
+def _inside(line: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """How far points, shape (..., 2), lie on the side of a line that its normal points to."""
+    return points @ line[:2] - line[2]
 
 
 def _line(points: np.ndarray) -> np.ndarray:
@@ -502,7 +512,7 @@ def _precise_bar(
 ) -> Bar | None:
     edges, off_line = [], []
     for line in lines:
-        on = points[np.abs(points @ line[:2] - line[2]) < 1.5]
+        on = points[np.abs(_inside(line, points)) < 1.5]
         inward, along = line[:2], np.array([-line[1], line[0]])
         # not where the edge ends
         low, high = np.percentile(on @ along, (3.0, 97.0))
@@ -512,11 +522,11 @@ def _precise_bar(
         if len(moved) < 0.5 * len(start):
             return None
         fitted = _line(moved)
-        distance = moved @ fitted[:2] - fitted[2]
+        distance = _inside(fitted, moved)
         moved = moved[np.abs(distance) < 3.0 * max(1.4826 * float(np.median(np.abs(distance))), 0.05)]
         fitted = _line(moved)
-        off_line.append(moved @ fitted[:2] - fitted[2])
-        edges.append([end - (end @ fitted[:2] - fitted[2]) * fitted[:2] for end in (start[0], start[-1])])
+        off_line.append(_inside(fitted, moved))
+        edges.append([end - _inside(fitted, end) * fitted[:2] for end in (start[0], start[-1])])
     residual = picture.step * math.sqrt(np.mean(np.concatenate(off_line) ** 2))
     return _bar(picture.place(np.array(edges)), picture.place(points), part.shape, picture, residual)
 

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import platform
 from collections.abc import Iterator, Mapping, Sequence
-from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,7 +11,17 @@ from pbrdf.report.comparison.subject import Compared, share
 from pbrdf.report.comparison.subject import table as ranking_table
 from pbrdf.report.dataset.describe import cautions, columns_in_words, describe
 from pbrdf.report.numbers import brief, per_cent, shown_unit, with_error
-from pbrdf.report.page import Section, bullets, command, markup, paragraph, render_page, table, terms
+from pbrdf.report.page import (
+    Section,
+    bullets,
+    command,
+    file_list,
+    paragraph,
+    render_page,
+    table,
+    terms,
+    versions,
+)
 from pbrdf.version import __version__
 
 if TYPE_CHECKING:
@@ -165,11 +173,10 @@ def _repeat(report: Compared, files: Sequence[str]) -> Iterator[Markup]:
         report.name,
         f"SHA-256 {report.sha256}" if report.sha256 else "not read from a single file: no SHA-256",
     ]
-    packages = [f"{name} {version(name)}" for name in _PACKAGES]
     rows: list[tuple[str, Sequence[str]]] = [
         ("Data", data),
         ("Noise", [comparison.best.result.noise]),
-        ("Versions", [", ".join([f"pbrdf {__version__}", f"Python {platform.python_version()}", *packages])]),
+        ("Versions", [versions(_PACKAGES)]),
         (
             "Time",
             [
@@ -183,5 +190,4 @@ def _repeat(report: Compared, files: Sequence[str]) -> Iterator[Markup]:
     if settings:
         rows.append(("Settings", ["; ".join(settings)]))
     yield terms(rows)
-    links = markup(" · ").join(markup('<a href="{}">{}</a>', name, name) for name in files)
-    yield markup("<p>Files beside this page: {}</p>", links)
+    yield file_list(files)

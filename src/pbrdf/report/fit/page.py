@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-import platform
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from importlib.metadata import version
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -28,12 +26,14 @@ from pbrdf.report.page import (
     Section,
     bullets,
     command,
-    markup,
+    file_list,
+    in_words,
     paragraph,
     render_page,
     subheading,
     table,
     terms,
+    versions,
 )
 from pbrdf.version import __version__
 
@@ -320,39 +320,18 @@ def _repeat(report: Report, files: Sequence[str]) -> Iterator[Markup]:
     data = [report.name, *([source] if source not in ("", Path(report.name).name) else [])]
     data.append(f"SHA-256 {report.sha256}" if report.sha256 else "not read from a single file: no SHA-256")
     rows.append(("Data", data))
-    rows.append(("Versions", [", ".join(_versions())]))
+    rows.append(("Versions", [versions(_PACKAGES)]))
     if settings := list(_settings(report.settings)):
         rows.append(("Settings", ["; ".join(settings)]))
     yield terms(rows)
     if files:
-        yield _file_list(files)
+        yield file_list(files)
     yield paragraph(
         "In Python, pbrdf.load_fit(folder) brings this fit back, number by number; pbrdf.load_model reads model.json."
     )
 
 
-def _versions() -> list[str]:
-    return [
-        f"pbrdf {__version__}",
-        f"Python {platform.python_version()}",
-        *(f"{name} {version(name)}" for name in _PACKAGES),
-    ]
-
-
 def _settings(settings: Mapping[str, object]) -> Iterator[str]:
     for name, value in settings.items():
         if value not in (None, [], {}, ()):
-            yield f"{name.replace('_', ' ')}: {_text(value)}"
-
-
-def _text(value: object) -> str:
-    if isinstance(value, Mapping):
-        return ", ".join(f"{k} = {_text(v)}" for k, v in value.items())
-    if isinstance(value, list | tuple):
-        return ", ".join(map(_text, value))
-    return str(value)
-
-
-def _file_list(files: Iterable[str]) -> Markup:
-    links = markup(" · ").join(markup('<a href="{}">{}</a>', name, name) for name in files)
-    return markup("<p>Files beside this page: {}</p>", links)
+            yield f"{name.replace('_', ' ')}: {in_words(value)}"

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import platform
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,7 +24,17 @@ from pbrdf.report.identification.classified import (
     classes_sentence,
 )
 from pbrdf.report.identification.subject import HEADINGS, Identified, level_of, rests_on, rows_of, sentence
-from pbrdf.report.page import Section, bullets, command, markup, paragraph, render_page, table, terms
+from pbrdf.report.page import (
+    Section,
+    bullets,
+    command,
+    file_list,
+    paragraph,
+    render_page,
+    table,
+    terms,
+    versions,
+)
 from pbrdf.version import __version__
 
 if TYPE_CHECKING:
@@ -152,19 +160,15 @@ def _footer() -> str:
 
 
 def _repeat(report: Any, files: Sequence[str], rows: list[tuple[str, Sequence[str]]]) -> Section:
-    packages = [f"{name} {version(name)}" for name in _PACKAGES]
-    rows.append(
-        ("Versions", [", ".join([f"pbrdf {__version__}", f"Python {platform.python_version()}", *packages])])
-    )
+    rows.append(("Versions", [versions(_PACKAGES)]))
     given = [f"{k.replace('_', ' ')}: {v}" for k, v in report.settings.items() if v not in (None, [], {}, ())]
     if given:
         rows.append(("Settings", ["; ".join(given)]))
-    links = markup(" · ").join(markup('<a href="{}">{}</a>', name, name) for name in files)
     return Section(
         "How to repeat it",
         [
             *([command(report.command)] if report.command else []),
             terms(rows),
-            markup("<p>Files beside this page: {}</p>", links),
+            file_list(files),
         ],
     )

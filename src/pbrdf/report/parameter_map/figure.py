@@ -15,7 +15,7 @@ import numpy as np
 
 from pbrdf.report.numbers import brief, per_cent
 from pbrdf.report.parameter_map.shown_map import GOOD, PENDING, WITHOUT, ShownMap
-from pbrdf.report.picture_grid import FLATTEST, STEEPEST, Margins, beside, picture_grid
+from pbrdf.report.picture_grid import Margins, beside, panel_height, picture_grid
 from pbrdf.report.style import BLUE, GREY, RED, styled
 
 if TYPE_CHECKING:
@@ -173,24 +173,20 @@ def _head(figure: Figure, title: str, shown: ShownMap) -> None:
 def _stretched(shown: ShownMap) -> bool:
     """Whether the panels have other proportions than the picture."""
     rows, columns = _proportions(shown)
-    return not FLATTEST <= rows / columns <= STEEPEST
-
-
-def _height(shown: ShownMap) -> float:
-    """Height over width of the panels."""
-    rows, columns = _proportions(shown)
-    return min(max(rows / columns, FLATTEST), STEEPEST)
+    return panel_height((rows, columns)) != rows / columns
 
 
 def _extent(shown: ShownMap) -> tuple[float, float, float, float]:
     """Left, right, bottom and top edge, the first row at the top."""
-    edges = []
-    for dim in shown.window.dims:
-        values = shown.coordinates[dim][0]
-        half = 0.5 * (values[1] - values[0]) if values.size > 1 else 0.5
-        edges.append((values[0] - half, values[-1] + half))
-    (top, bottom), (left, right) = edges
+    (top, bottom), (left, right) = (_edges(shown, dim) for dim in shown.window.dims)
     return left, right, bottom, top
+
+
+def _edges(shown: ShownMap, dim: str) -> tuple[float, float]:
+    """Outer edges of the first and the last pixel along a dimension."""
+    values = shown.coordinates[dim][0]
+    half = 0.5 * (values[1] - values[0]) if values.size > 1 else 0.5
+    return values[0] - half, values[-1] + half
 
 
 def _label_axes(ax: Axes, shown: ShownMap, *, down: bool, across: bool) -> None:
@@ -388,16 +384,14 @@ def _draw_states(ax: Axes, shown: ShownMap) -> None:
     colours = [_STATES.get(name) or next(others, "#000000") for name in shown.states]
     _ground(ax)
     if len(shown.window.dims) == 1:
-        at = shown.coordinates[shown.window.dims[0]][0]
-        half = 0.5 * (at[1] - at[0]) if at.size > 1 else 0.5
-        options: dict[str, Any] = {"extent": (at[0] - half, at[-1] + half, 0.0, 1.0), "aspect": "auto"}
         ax.imshow(
             np.ma.masked_where(shown.masked, shown.status)[None],
             cmap=ListedColormap(colours),
             vmin=0,
             vmax=len(colours) - 1,
             interpolation="nearest",
-            **options,
+            extent=(*_edges(shown, shown.window.dims[0]), 0.0, 1.0),
+            aspect="auto",
         )
         ax.set_yticks([])
     handles = []
@@ -518,11 +512,10 @@ def _draw_goodness(ax: Axes, shown: ShownMap) -> None:
     expected = stats.chi2(typical)
     low, high = min(low, expected.ppf(0.01) / typical), max(high, expected.ppf(0.99) / typical)
     count = _bins(values)
-    edges = (
-        np.geomspace(low, high, count + 1) if high > _WIDE * low > 0.0 else np.linspace(low, high, count + 1)
-    )
+    wide = high > _WIDE * low > 0.0
+    edges = (np.geomspace if wide else np.linspace)(low, high, count + 1)
     ax.hist(values, bins=edges.tolist(), color=BLUE, alpha=0.75, label="found")
-    if high > _WIDE * low > 0.0:
+    if wide:
         ax.set_xscale("log")
         _plain_ticks(ax.xaxis)
     # how many pixels a bar as wide as those there would have
@@ -537,4 +530,5 @@ def _draw_goodness(ax: Axes, shown: ShownMap) -> None:
     ax.legend(
         loc="lower left", bbox_to_anchor=(-0.03, 0.98), frameon=False, fontsize=8, ncols=2, columnspacing=1.0
     )
-    ax.set_title(f"median {brief(float(np.median(values)), 3)}", y=1.0 + 0.22 / (_PANEL * _height(shown)))
+    height = _PANEL * panel_height(_proportions(shown))
+    ax.set_title(f"median {brief(float(np.median(values)), 3)}", y=1.0 + 0.22 / height)

@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
-import platform
 from collections.abc import Iterator, Mapping, Sequence
-from importlib.metadata import version
 from typing import TYPE_CHECKING
 
 from pbrdf.report.numbers import brief, per_cent
-from pbrdf.report.page import Section, bullets, command, markup, paragraph, render_page, table, terms
+from pbrdf.report.page import (
+    Section,
+    bullets,
+    command,
+    file_list,
+    in_words,
+    paragraph,
+    render_page,
+    table,
+    terms,
+    versions,
+)
 from pbrdf.report.parameter_map.subject import MapReport
 from pbrdf.report.parameter_map.summary import MapSummary, counted, parameter_rows
 from pbrdf.version import __version__
@@ -117,10 +126,9 @@ def _repeat(report: MapReport, summary: MapSummary, files: Sequence[str]) -> Ite
     rows: list[tuple[str, Sequence[str]]] = [("Model", [summary.model])]
     if report.sources:
         rows.append(("Data", list(report.sources)))
-    versions = [f"pbrdf {__version__}", f"Python {platform.python_version()}"]
-    rows.append(("Versions", [", ".join([*versions, *(f"{name} {version(name)}" for name in _PACKAGES)])]))
+    rows.append(("Versions", [versions(_PACKAGES)]))
     settings = [
-        f"{name.replace('_', ' ')}: {_text(value)}"
+        f"{name.replace('_', ' ')}: {in_words(value)}"
         for name, value in report.settings.items()
         if value not in (None, [], {}, (), "", False)
     ]
@@ -138,7 +146,7 @@ def _repeat(report: MapReport, summary: MapSummary, files: Sequence[str]) -> Ite
         f'found["estimate"].sel(parameter="{first}").where(good).plot()'
     )
     if files:
-        yield _file_list(files)
+        yield file_list(files)
     yield bullets(
         [
             f"Estimates and errors are stored in the units of the model ({_units(summary)}).",
@@ -150,16 +158,3 @@ def _repeat(report: MapReport, summary: MapSummary, files: Sequence[str]) -> Ite
 def _units(summary: MapSummary) -> str:
     degrees = [p.label.name for p in summary.parameters if p.label.unit == "°"]
     return f"angles in radians: {', '.join(degrees)}" if degrees else "those of the table"
-
-
-def _text(value: object) -> str:
-    if isinstance(value, Mapping):
-        return ", ".join(f"{k} = {_text(v)}" for k, v in value.items())
-    if isinstance(value, list | tuple):
-        return ", ".join(map(_text, value))
-    return str(value)
-
-
-def _file_list(files: Sequence[str]) -> Markup:
-    links = markup(" · ").join(markup('<a href="{}">{}</a>', name, name) for name in files)
-    return markup("<p>Files beside this page: {}</p>", links)

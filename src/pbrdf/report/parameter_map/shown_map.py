@@ -220,7 +220,6 @@ class ShownMap:
     def __init__(self, dataset: xr.Dataset, window: Window | None = None, *, empty: bool = False) -> None:
         self.labels = labels_of(dataset)
         self.window = Window.of(dataset) if window is None else window
-        self.attrs = dict(dataset.attrs)
         status, flags = dataset["status"].attrs, dataset["flags"].attrs
         self.states = [*str(status["flag_meanings"]).split(), PENDING]
         self.codes = np.asarray(status["flag_values"]).ravel().astype(int)
@@ -236,12 +235,10 @@ class ShownMap:
         self.degrees_of_freedom = np.zeros(shape, dtype=np.int32)
         self.optima, self.starts = np.zeros(shape, dtype=np.int16), np.zeros(shape, dtype=np.int16)
         self.status = np.full(shape, len(self.states) - 1, dtype=np.int8)
-        self.coordinates = {d: _coordinate(dataset, d, step) for d, step in self._steps()}
+        steps = zip(self.window.dims, self.window.steps, strict=True)
+        self.coordinates = {d: _coordinate(dataset, d, step) for d, step in steps}
         if not empty:
             self.update(dataset, {})
-
-    def _steps(self) -> list[tuple[str, int]]:
-        return list(zip(self.window.dims, self.window.steps, strict=True))
 
     def update(self, dataset: xr.Dataset, region: Mapping[str, slice]) -> None:
         """Read what a part of the map holds now.
