@@ -30,7 +30,7 @@ import numpy as np
 
 from pbrdf.backend import get_backend
 
-__all__ = ["LOSSES", "Residuals", "Solution", "Status", "costs", "linearise", "solve"]
+__all__ = ["LOSSES", "Residuals", "Solution", "Status", "costs", "linearise", "on_bounds", "solve"]
 
 #: Iterations of one kernel launch, after which stopped lanes leave the batch. A batch of at most SMALL_BATCH
 #: lanes runs for as many as make LAUNCH evaluations: recording the kernel anew would take longer than idle lanes do.
@@ -192,9 +192,14 @@ class Solution:
         """
         cost = np.where(np.isfinite(self.cost), self.cost, np.inf)
         as_low = np.flatnonzero(cost <= cost.min() * (1.0 + NOTHING_TO_GAIN))
-        margin = BOUND_MARGIN * (upper - lower)
-        held = ((self.u <= lower + margin) | (self.u >= upper - margin)).sum(axis=1)
+        held = np.logical_or(*on_bounds(self.u, lower, upper)).sum(axis=1)
         return int(min(as_low, key=lambda lane: (not self.converged[lane], held[lane], cost[lane])))
+
+
+def on_bounds(u: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Which unknowns stand on their lower and on their upper bound, of shapes that broadcast."""
+    margin = BOUND_MARGIN * (upper - lower)
+    return u <= lower + margin, u >= upper - margin
 
 
 def solve(

@@ -32,7 +32,7 @@ from pbrdf.inversion.parameter_map.search import fit_pixels
 from pbrdf.inversion.parameter_map.shared import Shared, Sums, described, newton, sums_of, with_priors
 from pbrdf.inversion.parameter_map.spread import spread_of
 from pbrdf.inversion.problem import Space
-from pbrdf.inversion.solver import BOUND_MARGIN, Status
+from pbrdf.inversion.solver import Status, on_bounds
 from pbrdf.inversion.stack import Stack
 from pbrdf.inversion.starts import sobol_starts
 from pbrdf.inversion.unknowns import bounds_of_each, check_choices, space_of, with_terms
@@ -294,8 +294,7 @@ max_iterations, share, correlation
             for part in parts:
                 pixels = self._pixels(part, theta, labels)
                 ends = fit_pixels(pixels, part.shape, part.places, part.freedom, part.stack.std_known)
-                margin = BOUND_MARGIN * (pixels.high - pixels.low)
-                inside = (ends.u > pixels.low + margin) & (ends.u < pixels.high - margin)
+                inside = ~np.logical_or(*on_bounds(ends.u, pixels.low, pixels.high))
                 total = total + sums_of(
                     np.searchsorted(labels, part.label),
                     len(labels),
@@ -325,8 +324,7 @@ max_iterations, share, correlation
         theta, sums, converged, passes = newton(
             lambda at: evaluate(at, (p for p in map(self._part, blocks) if p is not None)), begin, low, high
         )
-        margin = BOUND_MARGIN * (high - low)
-        inside = (theta > low + margin) & (theta < high - margin)
+        inside = ~np.logical_or(*on_bounds(theta, low, high))
         spreads = [
             spread_of(t[None], A[None], a[None], b[None], np.ones(1)).covariance[0]
             for t, A, a, b in zip(theta, sums.curvature, low, high, strict=True)
