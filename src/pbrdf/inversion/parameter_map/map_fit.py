@@ -133,14 +133,15 @@ max_iterations, share, correlation
             like.with_covariance(covariance)
         space, begin = space_of(model, options or {}, fix or {}, free, bounds or {}, start or {}, like)
         space = with_terms(space, like, priors or {}, {}, terms, bounds or {}, loss)
-        share = (share,) if isinstance(share, str) else tuple(share)
+        share = [share] if isinstance(share, str) else list(dict.fromkeys(share))
         for name in share:
             if name not in space.names:
                 raise FitError(f"share: {name!r} is not a free parameter; free are {', '.join(space.names)}")
-        if like.count <= len(space.free) - len(set(share)):
+        own = len(space.free) - len(share)
+        if like.count <= own:
             raise FitError(
-                f"{like.count} measured values cannot determine {len(space.free) - len(set(share))} parameters of a "
-                "pixel: measure more, or fix parameters"
+                f"{like.count} measured values cannot determine {own} parameters of a pixel: measure more, or fix "
+                "parameters"
             )
         shown = space.build(0.5 * (space.lower + space.upper))
         settings = {
@@ -162,7 +163,7 @@ max_iterations, share, correlation
             "covariance": None if covariance is None else hashlib.sha256(covariance.tobytes()).hexdigest(),
             "seed": int(seed),
             "max_iterations": int(max_iterations),
-            "share": list(share),
+            "share": share,
             "labels": labels,
             "correlation": bool(correlation),
         }
