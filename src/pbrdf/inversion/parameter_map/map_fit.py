@@ -287,7 +287,7 @@ max_iterations, share, correlation
         if not self.settings["share"]:
             return self
         few, labels, low, high = self._first_pass(blocks)
-        columns = np.array([self.space.names.index(name) for name in self.settings["share"]])
+        columns = self._shared_columns
         priors = self._shared_space
 
         def evaluate(theta: np.ndarray, parts: Iterable[_Part]) -> Sums:
@@ -326,17 +326,13 @@ max_iterations, share, correlation
             lambda at: evaluate(at, (p for p in map(self._part, blocks) if p is not None)), begin, low, high
         )
         inside = ~np.logical_or(*on_bounds(theta, low, high))
-        spreads = [
-            spread_of(t[None], A[None], a[None], b[None], np.ones(1)).covariance[0]
-            for t, A, a, b in zip(theta, sums.curvature, low, high, strict=True)
-        ]
         shared = Shared(
             columns=columns,
             labels=labels,
             unknowns=theta,
             low=low,
             high=high,
-            covariance=np.stack(spreads),
+            covariance=spread_of(theta, sums.curvature, low, high, np.ones(len(labels))).covariance,
             chi2=2.0 * sums.cost,
             freedom=(sums.values - sums.own - inside.sum(axis=1)).astype(int),
             std_known=sums.guessed == 0,
@@ -355,7 +351,7 @@ max_iterations, share, correlation
         self, blocks: Iterable[xr.Dataset]
     ) -> tuple[list[_Part], np.ndarray, np.ndarray, np.ndarray]:
         """Some pixels of each label; the labels; and the bounds of the shared unknowns, shape (L, S)."""
-        columns = [self.space.names.index(name) for name in self.settings["share"]]
+        columns = self._shared_columns
         limits: dict[int, tuple[np.ndarray, np.ndarray]] = {}
         held: dict[int, int] = {}
         few = []
@@ -407,9 +403,14 @@ max_iterations, share, correlation
         return len(self.space.free) - len(self.settings["share"])
 
     @property
+    def _shared_columns(self) -> np.ndarray:
+        """Which of the free parameters pixels share."""
+        return np.array([self.space.names.index(name) for name in self.settings["share"]], dtype=int)
+
+    @property
     def _shared_space(self) -> Space:
         """The shared parameters alone, with their priors."""
-        columns = [self.space.names.index(name) for name in self.settings["share"]]
+        columns = self._shared_columns
         return replace(
             self.space,
             free=tuple(self.space.free[c] for c in columns),
@@ -449,7 +450,7 @@ max_iterations, share, correlation
         space, starts = self.space, self.settings["starts"]
         if theta is not None:
             known = labels if labels is not None else self.shared.labels  # type: ignore[union-attr]
-            columns = [self.space.names.index(name) for name in self.settings["share"]]
+            columns = self._shared_columns
             low[:, columns] = high[:, columns] = theta[np.searchsorted(known, part.label)]
             # a prior of what is shared counts once, not for each pixel
             terms = [replace(t, prior=None) if c in columns else t for c, t in enumerate(space.terms)]
