@@ -10,7 +10,7 @@ import numpy as np
 from pbrdf.inversion import minimise
 from pbrdf.inversion.block_solver import BlockResiduals
 from pbrdf.inversion.problem import Space, residuals
-from pbrdf.inversion.solver import NOTHING_TO_GAIN, Solution, Status, costs, on_bounds
+from pbrdf.inversion.solver import CONVERGED, NOTHING_TO_GAIN, Solution, Status, costs, on_bounds
 from pbrdf.inversion.solver import solve as solve_whole
 from pbrdf.inversion.stack import Stack
 from pbrdf.inversion.starts import sobol_starts
@@ -62,6 +62,11 @@ class Ends:
             np.zeros(batch, dtype=int),
             np.zeros(batch, dtype=int),
         )
+
+    @property
+    def converged(self) -> np.ndarray:
+        """Which pixels stand at a minimum, shape (B,)."""
+        return np.isin(self.status, CONVERGED)
 
     @property
     def reached(self) -> np.ndarray:

@@ -32,7 +32,7 @@ from pbrdf.inversion.parameter_map.search import fit_pixels
 from pbrdf.inversion.parameter_map.shared import Shared, Sums, described, newton, sums_of, with_priors
 from pbrdf.inversion.parameter_map.spread import spread_of
 from pbrdf.inversion.problem import Space
-from pbrdf.inversion.solver import Status, on_bounds
+from pbrdf.inversion.solver import on_bounds
 from pbrdf.inversion.stack import Stack
 from pbrdf.inversion.starts import sobol_starts
 from pbrdf.inversion.unknowns import bounds_of_each, check_choices, space_of, with_terms
@@ -471,7 +471,7 @@ max_iterations, share, correlation
     def _store(self, ends: Ends, pixels: Pixels, part: _Part, flat: Mapping[str, np.ndarray]) -> None:
         """Estimates and all that is said of them, into the arrays of a block."""
         space, reached, usable = self.space, ends.reached, part.usable
-        converged = np.isin(ends.status, [s for s in Status if s.converged])
+        converged = ends.converged
         chi2 = 2.0 * ends.cost
         low, high, common = pixels.low, pixels.high, None
         scale = np.where(part.stack.std_known, 1.0, chi2 / part.freedom)
