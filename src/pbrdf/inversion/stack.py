@@ -58,7 +58,7 @@ class Stack:
     wavelength: np.ndarray | None = None
     scale: np.ndarray | None = None
     whitening: Mapping[tuple[int, int], np.ndarray] | None = None
-    _uploaded: dict[tuple[str, str], Any] = field(default_factory=dict, repr=False)
+    _uploaded: dict[tuple[str, Any], Any] = field(default_factory=dict, repr=False)
 
     @classmethod
     def of(cls, data: Sequence[Observations]) -> Stack:
@@ -272,7 +272,7 @@ class Stack:
 
     def upload(self, name: str, Float: Any) -> list[Any]:
         """Arrays of one attribute in memory of Dr.Jit's own, as they are read by a fit; kept for the next."""
-        key = (name, Float.__name__)
+        key = (name, Float)
         if key not in self._uploaded:
             arrays: list[np.ndarray]
             if name == "weights":
