@@ -242,17 +242,19 @@ def map_pixels(
     named = None if labels is None else LABEL
     source = PictureSource.open(stokes, places, scale=counts_per_brdf, labels=labels)
     try:
-        fit = MapFit.prepare(source.outline(), chosen, labels=named, **arguments)
+        outline = source.outline()
+        fit = MapFit.prepare(outline, chosen, labels=named, **arguments)
     except DataError as error:
         raise DataError(f"{stokes[0]}: {error}") from error
     if target.exists() and target.suffix == ".zarr":
         # before what pixels share is sought, which takes long
         MapStore(target, fit, source).require_same_settings(apart_from="fit.shared")
     if target.suffix == ".nc":
-        found = _fit_in_memory(source, chosen, target, {"labels": named, **arguments}, quiet)
+        found = _fit_in_memory(source, outline, chosen, target, {"labels": named, **arguments}, quiet)
     else:
         picture = report / _QUICK_LOOK if figures else None
-        if not _fill(target, fit, source, place, scheduler, (unit, memory), picture, quiet):
+        grid = _units(outline, fit.dims, unit, memory)
+        if not _fill(target, fit, source, grid, place, scheduler, picture, quiet):
             if quiet:
                 print(target)
             return
@@ -263,7 +265,7 @@ def map_pixels(
         [str(path) for path in stokes],
         {"model": model, **arguments, "geometry": geometry, "counts per brdf": counts_per_brdf},
         command_line(),
-        simulated=bool(source.outline().attrs.get("simulated")),
+        simulated=bool(outline.attrs.get("simulated")),
     )
     _report(subject, report, formats, figures, quiet)
 
@@ -353,14 +355,19 @@ def _newest(path: Path) -> float:
 
 
 def _fit_in_memory(
-    source: PictureSource, model: str | Model, target: Path, arguments: dict[str, Any], quiet: bool
+    source: PictureSource,
+    outline: xr.Dataset,
+    model: str | Model,
+    target: Path,
+    arguments: dict[str, Any],
+    quiet: bool,
 ) -> xr.Dataset:
     """Fit a small map and write it into one file."""
     from pbrdf.files.atomic import atomic_file
     from pbrdf.files.netcdf_files import write_netcdf_file
     from pbrdf.inversion.parameter_map import fit_map
 
-    numbers = sum(variable.size for variable in source.outline().variables.values())
+    numbers = sum(variable.size for variable in outline.variables.values())
     if numbers > _MOST_IN_MEMORY:
         raise PbrdfError(
             f"--output {target}: the data have {numbers:.2g} numbers, too many for a map in memory: choose a name that "
@@ -378,21 +385,17 @@ def _fill(
     target: Path,
     fit: MapFit,
     source: PictureSource,
+    grid: UnitGrid,
     place: tuple[int, int] | None,
     scheduler: str | None,
-    asked: tuple[int | None, int],
     picture: Path | None,
     quiet: bool,
 ) -> bool:
-    """Fit what is missing in the store of a map; returns whether it is complete.
-
-    Units have the side asked for, or as many pixels as the memory asked for holds.
-    """
+    """Fit what is missing in the store of a map, of units as ``grid`` says; returns whether it is complete."""
     from pbrdf.inversion.map_store import prepare_store, run_on_scheduler, run_units
     from pbrdf.inversion.map_store.shared_file import with_shared
     from pbrdf.report.parameter_map.quicklook import QuickLook
 
-    grid = _units(source.outline(), fit.dims, *asked)
     if fit.settings["share"]:
         kept = target.with_name(f"{target.stem}-shared.npz")
         with stage_bar(quiet, _SHARING) as show:
@@ -429,7 +432,7 @@ def _fill(
 
 
 def _units(outline: xr.Dataset, dims: Sequence[str], side: int | None, memory: int) -> UnitGrid:
-    """How a map is cut where there is no store yet."""
+    """How a map is cut where there is no store yet: by the side asked for, or as the memory asked for holds."""
     from pbrdf.inversion.map_store.unit_grid import UNIT, UnitGrid
 
     sizes = {dim: outline.sizes[dim] for dim in dims}

@@ -10,7 +10,7 @@ import numpy as np
 from pbrdf.inversion.clusters import cluster
 from pbrdf.inversion.observations import Observations
 from pbrdf.inversion.problem import Space
-from pbrdf.inversion.solver import BOUND_MARGIN, Solution
+from pbrdf.inversion.solver import Solution, on_bounds
 from pbrdf.inversion.statistics import Goodness, covariance, prior_spread
 from pbrdf.models.parameters import Parameter
 
@@ -84,8 +84,7 @@ def estimates_at(
     """
     low, high = space.box
     u = solution.u[best]
-    margin = BOUND_MARGIN * (high - low)
-    at_low, at_high = u <= low + margin, u >= high - margin
+    at_low, at_high = on_bounds(u, low, high)
     inside = np.flatnonzero(~(at_low | at_high))
     prior = prior_spread(low, high)
     information = solution.information[best][np.ix_(inside, inside)]

@@ -11,6 +11,7 @@ import numpy as np
 from pbrdf.data.schema import is_ratio
 from pbrdf.errors import FitError
 from pbrdf.files.plain_numbers import number_from_text
+from pbrdf.inversion.statistics import typical_of_each
 
 __all__ = ["EqualNoise", "InstrumentNoise", "Noise", "NoiseModel", "parse_noise"]
 
@@ -101,7 +102,8 @@ class NoiseModel:
     def standard_uncertainty(self, channel: str, intensity: np.ndarray, scale: np.ndarray) -> np.ndarray:
         """See :class:`Noise`."""
         size = np.abs(intensity)
-        median = _median(size)
+        median = typical_of_each(size)
+        median = np.where(np.isfinite(median), median, 1.0)
         floor = np.maximum(self.absolute * median, np.finfo(float).tiny)
         if is_ratio(channel):
             size = np.where(np.isfinite(size), size, median)
@@ -186,30 +188,6 @@ class EqualNoise:
 
     def __str__(self) -> str:
         return "equal weights"
-
-
-def _median(values: np.ndarray) -> np.ndarray:
-    """Median of what is finite along the last axis, which is kept; 1 where nothing is.
-
-    Of what is above 0 where the median is 0, see :func:`pbrdf.inversion.statistics.typical`.
-    """
-    known = np.isfinite(values)
-    median = _middle(np.where(known, values, np.inf), known)
-    lit = known & (values > 0.0)
-    black = (median == 0.0) & lit.any(axis=-1, keepdims=True)
-    if black.any():
-        median = np.where(black, _middle(np.where(lit, values, np.inf), lit), median)
-    return np.where(known.any(axis=-1, keepdims=True), median, 1.0)
-
-
-def _middle(values: np.ndarray, chosen: np.ndarray) -> np.ndarray:
-    """Median along the last axis of the chosen values, those not chosen being infinite."""
-    count = chosen.sum(axis=-1, keepdims=True)
-    ordered = np.sort(values, axis=-1)
-    low, high = (
-        np.take_along_axis(ordered, np.maximum(place, 0), axis=-1) for place in ((count - 1) // 2, count // 2)
-    )
-    return 0.5 * low + 0.5 * high
 
 
 def parse_noise(text: str) -> Noise:

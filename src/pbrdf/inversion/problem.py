@@ -20,7 +20,7 @@ from pbrdf.inversion.stack import Stack
 from pbrdf.models.base import Model
 from pbrdf.models.parameters import Parameter
 
-__all__ = ["Space", "Term", "derivatives", "misfits", "predict", "residuals", "signals_of"]
+__all__ = ["Space", "Term", "derivatives", "misfits", "predict", "prior_residuals", "residuals", "signals_of"]
 
 #: What an even parameter is at least where derivatives are taken, which at 0 would be 0/0: far below what matters.
 _POINT = 1e-6
@@ -233,7 +233,7 @@ def residuals(
         residuals=Residuals(function, points, loss=space.loss),
         order=order[np.argsort(place[order], kind="stable")],
         begin=np.searchsorted(np.sort(place), np.arange(blocks + 1)),
-        penalty=_block_penalty(space),
+        penalty=prior_residuals(space),
     )
 
 
@@ -482,7 +482,7 @@ def _penalty(space: Space) -> Any:
     return penalty
 
 
-def _block_penalty(space: Space) -> Any:
+def prior_residuals(space: Space) -> Any:
     """Residuals of the priors of all unknowns and their derivatives, or None; see :class:`BlockResiduals`."""
     priors = np.array([(0.0, np.inf) if term.prior is None else term.prior for term in space.terms])
     if np.isinf(priors[:, 1]).all():

@@ -30,7 +30,17 @@ import numpy as np
 
 from pbrdf.backend import get_backend
 
-__all__ = ["LOSSES", "Residuals", "Solution", "Status", "costs", "linearise", "solve"]
+__all__ = [
+    "CONVERGED",
+    "LOSSES",
+    "Residuals",
+    "Solution",
+    "Status",
+    "costs",
+    "linearise",
+    "on_bounds",
+    "solve",
+]
 
 #: Iterations of one kernel launch, after which stopped lanes leave the batch. A batch of at most SMALL_BATCH
 #: lanes runs for as many as make LAUNCH evaluations: recording the kernel anew would take longer than idle lanes do.
@@ -116,7 +126,7 @@ class Status(enum.IntEnum):
 
 
 #: Why a lane stopped that stands at a minimum.
-_CONVERGED = [status for status in Status if status.converged]
+CONVERGED = [status for status in Status if status.converged]
 
 
 @dataclass(frozen=True)
@@ -182,7 +192,7 @@ class Solution:
     @property
     def converged(self) -> np.ndarray:
         """Mask of the lanes that stand at a minimum, shape (B,)."""
-        return np.isin(self.status, _CONVERGED)
+        return np.isin(self.status, CONVERGED)
 
     def best(self, lower: np.ndarray, upper: np.ndarray) -> int:
         """Number of the lane of the lowest cost: among those as low but for rounding, one at a minimum.
@@ -192,9 +202,14 @@ class Solution:
         """
         cost = np.where(np.isfinite(self.cost), self.cost, np.inf)
         as_low = np.flatnonzero(cost <= cost.min() * (1.0 + NOTHING_TO_GAIN))
-        margin = BOUND_MARGIN * (upper - lower)
-        held = ((self.u <= lower + margin) | (self.u >= upper - margin)).sum(axis=1)
+        held = np.logical_or(*on_bounds(self.u, lower, upper)).sum(axis=1)
         return int(min(as_low, key=lambda lane: (not self.converged[lane], held[lane], cost[lane])))
+
+
+def on_bounds(u: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Which unknowns stand on their lower and on their upper bound, of shapes that broadcast."""
+    margin = BOUND_MARGIN * (upper - lower)
+    return u <= lower + margin, u >= upper - margin
 
 
 def solve(
@@ -260,7 +275,7 @@ def solve(
         if search:
             return rough.solution()
         # rounding makes lanes stall in single precision that stand at their minimum
-        close = np.isin(rough.status, [*_CONVERGED, Status.STALLED])
+        close = np.isin(rough.status, [*CONVERGED, Status.STALLED])
         start = np.where(np.isfinite(rough.cost)[:, None], np.clip(rough.u.T, lower, upper), start)
         damping, last = np.where(close, DAMPING_NEAR, DAMPING), np.where(close, LAST_STEP_NEAR, LAST_STEP)
         tried, progress = rough.iterations, None

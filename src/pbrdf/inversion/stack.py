@@ -17,6 +17,7 @@ from pbrdf.data.schema import COVARIANCE, is_ratio
 from pbrdf.errors import FitError
 from pbrdf.inversion.noise import Noise
 from pbrdf.inversion.observations import SINGULAR, Observations, measurements
+from pbrdf.inversion.statistics import middle
 from pbrdf.optics.stokes import STOKES
 
 __all__ = ["Stack"]
@@ -57,7 +58,7 @@ class Stack:
     wavelength: np.ndarray | None = None
     scale: np.ndarray | None = None
     whitening: Mapping[tuple[int, int], np.ndarray] | None = None
-    _uploaded: dict[tuple[str, str], Any] = field(default_factory=dict, repr=False)
+    _uploaded: dict[tuple[str, Any], Any] = field(default_factory=dict, repr=False)
 
     @classmethod
     def of(cls, data: Sequence[Observations]) -> Stack:
@@ -244,13 +245,8 @@ class Stack:
         if not found:
             return np.full(len(self), np.nan)
         intensity = self.values[found].reshape(-1, len(self))
-        ordered = np.sort(np.where(intensity > 0.0, intensity, np.inf), axis=0)
-        count = np.isfinite(ordered).sum(axis=0)
-        low, high = (
-            np.take_along_axis(ordered, np.maximum(place, 0)[None], axis=0)[0]
-            for place in ((count - 1) // 2, count // 2)
-        )
-        return np.where(count > 0, 0.5 * low + 0.5 * high, np.nan)
+        median = middle(intensity, intensity > 0.0, axis=0)[0]
+        return np.where(np.isfinite(median), median, np.nan)
 
     def different_values(self) -> np.ndarray:
         """Number of values that a model can tell apart, shape (B,): see :meth:`Observations.distinct`."""
@@ -276,7 +272,7 @@ class Stack:
 
     def upload(self, name: str, Float: Any) -> list[Any]:
         """Arrays of one attribute in memory of Dr.Jit's own, as they are read by a fit; kept for the next."""
-        key = (name, Float.__name__)
+        key = (name, Float)
         if key not in self._uploaded:
             arrays: list[np.ndarray]
             if name == "weights":

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-__all__ = ["Goodness", "covariance", "goodness", "prior_spread", "typical"]
+__all__ = ["Goodness", "covariance", "goodness", "middle", "prior_spread", "typical", "typical_of_each"]
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,28 @@ def prior_spread(lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
 
 def typical(values: np.ndarray) -> float:
     """Median size of what was measured; where that is 0, as most of it is black, of what is not; 0 of nothing."""
-    size = np.abs(values[np.isfinite(values)])
-    median = float(np.median(size)) if size.size else 0.0
-    lit = size[size > 0.0]
-    return float(np.median(lit)) if median == 0.0 and lit.size else median
+    if not np.isfinite(values).any():
+        return 0.0
+    return float(typical_of_each(np.abs(values).ravel())[0])
+
+
+def typical_of_each(size: np.ndarray) -> np.ndarray:
+    """What :func:`typical` says of the sizes along the last axis, which is kept; infinite of nothing."""
+    known = np.isfinite(size)
+    median = middle(size, known)
+    if (median == 0.0).any():
+        lit = middle(size, known & (size > 0.0))
+        median = np.where((median == 0.0) & np.isfinite(lit), lit, median)
+    return median
+
+
+def middle(values: np.ndarray, chosen: np.ndarray, axis: int = -1) -> np.ndarray:
+    """Median of the chosen values along an axis, which is kept; infinite where none is."""
+    ordered = np.where(chosen, values, np.inf)
+    ordered.sort(axis=axis)
+    count = chosen.sum(axis=axis, keepdims=True)
+    low, high = (
+        np.take_along_axis(ordered, np.maximum(place, 0), axis=axis)
+        for place in ((count - 1) // 2, count // 2)
+    )
+    return 0.5 * low + 0.5 * high

@@ -68,8 +68,7 @@ def log2(x: Any) -> Any:
     """log₂x, x > 0."""
     if not dr.is_jit_v(x):
         return dr.log2(x)
-    F, own = _format(x)
-    Int: Any = dr.int32_array_t(F) if own is _SINGLE else dr.int64_array_t(F)
+    F, Int, own = _format(x)
     bits: Any = dr.reinterpret_array(Int, dr.detach(x))
     octave = (bits - own.lowest) >> own.mantissa
     mantissa: Any = dr.reinterpret_array(F, bits - (octave << own.mantissa))
@@ -86,8 +85,7 @@ def exp2(x: Any) -> Any:
     """2^x, between the numbers' least and largest power of two."""
     if not dr.is_jit_v(x):
         return dr.exp2(x)
-    F, own = _format(x)
-    Int: Any = dr.int32_array_t(F) if own is _SINGLE else dr.int64_array_t(F)
+    F, Int, own = _format(x)
     y = dr.detach(x)
     # selects in this order keep NaN, in one instruction each
     y = dr.select(y < own.least, own.least, dr.select(y > own.largest, own.largest, y))
@@ -116,8 +114,10 @@ def polynomial(x: Any, coefficients: tuple[Any, ...]) -> Any:
     return total
 
 
-def _format(x: Any) -> tuple[Any, _Format]:
-    return type(x), _SINGLE if dr.type_v(x) == dr.VarType.Float32 else _DOUBLE
+def _format(x: Any) -> tuple[Any, Any, _Format]:
+    """Type of an array, that of the integers of its bits, and its format."""
+    F = type(x)
+    return (F, dr.int32_array_t(F), _SINGLE) if is_single(x) else (F, dr.int64_array_t(F), _DOUBLE)
 
 
 def is_single(x: Any) -> bool:

@@ -473,10 +473,9 @@ def _sum_edge(integrand: Callable[..., Any], size: int, state: Any, rows: _Rows)
     first, count = rows.ranges(0)
 
     def row(j: Any, sigma: Any, vectors: Any, args: Any) -> list[Any]:
-        geometry = Geometry(*vectors)
-        (f, e), c_near, *_ = _nearer_edge_axes(geometry, *_edges(geometry, sigma))
+        f, e, beyond = _edge_axes(sigma, vectors)
         below, above, weight, _ = rows.rows(rows.first_along + j)
-        w, share = _between(below, above, 0.0, _tail(c_near))
+        w, share = _between(below, above, 0.0, beyond)
         w = sigma * w
 
         def pair(j: Any, sigma: Any, vectors: Any, args: Any, row: Any) -> list[Any]:
@@ -560,16 +559,10 @@ def _packet_average(
     state = sigma, tuple(geometry), args
     edge_rows = _packets(F, [(_phi(z), _phi(-z), weight, 0.0) for z, weight in _PACKET_ROWS])
 
-    def axes(sigma: Any, vectors: Any) -> tuple[Any, ...]:
-        geometry = Geometry(*vectors)
-        (f, e), c_near, *_ = _nearer_edge_axes(geometry, *_edges(geometry, sigma))
-        return f, e, _tail(c_near)
-
-    known = None if differentiated(state) else axes(*state[:2])
+    known = None if differentiated(state) else _edge_axes(*state[:2])
 
     def row(j: Any, sigma: Any, vectors: Any, args: Any) -> list[Any]:
-        geometry = Geometry(*vectors)
-        f, e, beyond = known or axes(sigma, vectors)
+        f, e, beyond = known or _edge_axes(sigma, vectors)
         below, above, row_weight, _ = edge_rows(j)
         w, share = _between(below, above, 0.0, beyond)
         w, row_weight = sigma * w, share * row_weight
@@ -580,7 +573,7 @@ def _packet_average(
             inverse = dr.rsqrt(dr.fma(v, v, length2))
             for side in (v, -v):
                 slopes = dr.fma(e[0], side, x), dr.fma(e[1], side, y)
-                found.append(_within(integrand, *slopes, inverse, row_weight * weight, geometry, args))
+                found.append(_within(integrand, *slopes, inverse, row_weight * weight, vectors, args))
         return _added(*found)
 
     c_far = dr.maximum(*_edges(geometry, sigma))
@@ -729,6 +722,13 @@ def _nearer_edge_axes(geometry: Geometry, c_i: Any, c_r: Any) -> tuple[Any, ...]
     turn = dr.select((sin_phi > 0.0) == nearer_i, -1.0, 1.0)
     e = (-turn * f[1], turn * f[0])
     return (f, e), dr.minimum(c_i, c_r), dr.maximum(c_i, c_r), -cos_phi, dr.abs(sin_phi)
+
+
+def _edge_axes(sigma: Any, vectors: Any) -> tuple[Any, ...]:
+    """Axes across and along the nearer edge, and the probability beyond it."""
+    geometry = Geometry(*vectors)
+    (f, e), c_near, *_ = _nearer_edge_axes(geometry, *_edges(geometry, sigma))
+    return f, e, _tail(c_near)
 
 
 def _wedge_axes(geometry: Geometry, c_i: Any, c_r: Any, along: Any) -> tuple[Any, ...]:

@@ -140,6 +140,11 @@ def test_whoever_fits_a_block_has_what_is_shared(data):
     assert [*found.template().data_vars] == [*again.data_vars] and again.attrs == found.template().attrs
 
 
+def test_a_name_that_is_given_twice_is_shared_once(data):
+    prepared = pbrdf.MapFit.prepare(data, fix=FIX, share=["n", "n"], starts=8)
+    assert prepared.settings["share"] == ["n"]
+
+
 def test_blocks_need_what_is_shared_first(data):
     prepared = pbrdf.MapFit.prepare(data, fix=FIX, share="n")
     with pytest.raises(pbrdf.FitError, match=r"MapFit\.solve_shared"):

@@ -10,7 +10,7 @@ import numpy as np
 from pbrdf.inversion import minimise
 from pbrdf.inversion.block_solver import BlockResiduals
 from pbrdf.inversion.problem import Space, residuals
-from pbrdf.inversion.solver import BOUND_MARGIN, NOTHING_TO_GAIN, Solution, Status, costs
+from pbrdf.inversion.solver import CONVERGED, NOTHING_TO_GAIN, Solution, Status, costs, on_bounds
 from pbrdf.inversion.solver import solve as solve_whole
 from pbrdf.inversion.stack import Stack
 from pbrdf.inversion.starts import sobol_starts
@@ -62,6 +62,11 @@ class Ends:
             np.zeros(batch, dtype=int),
             np.zeros(batch, dtype=int),
         )
+
+    @property
+    def converged(self) -> np.ndarray:
+        """Which pixels stand at a minimum, shape (B,)."""
+        return np.isin(self.status, CONVERGED)
 
     @property
     def reached(self) -> np.ndarray:
@@ -236,9 +241,8 @@ def _best(
     cost = np.where(np.isfinite(cost), cost, np.inf)
     status = table(solution.status, int(Status.NOT_FINITE))
     converged = table(solution.converged, False)
-    margin = BOUND_MARGIN * (high - low)
     with np.errstate(invalid="ignore"):
-        on_bound = (u <= (low + margin)[:, None]) | (u >= (high - margin)[:, None])
+        on_bound = np.logical_or(*on_bounds(u, low[:, None], high[:, None]))
         as_low = cost <= cost.min(axis=1, keepdims=True) * (1.0 + NOTHING_TO_GAIN)
     rank = np.where(as_low, 0, 4 * size) + np.where(converged, 0, 2 * size) + on_bound.sum(axis=2)
     lowest = np.where(rank == rank.min(axis=1, keepdims=True), cost, np.inf)

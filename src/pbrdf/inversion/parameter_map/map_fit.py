@@ -32,7 +32,7 @@ from pbrdf.inversion.parameter_map.search import fit_pixels
 from pbrdf.inversion.parameter_map.shared import Shared, Sums, described, newton, sums_of, with_priors
 from pbrdf.inversion.parameter_map.spread import spread_of
 from pbrdf.inversion.problem import Space
-from pbrdf.inversion.solver import BOUND_MARGIN, Status
+from pbrdf.inversion.solver import on_bounds
 from pbrdf.inversion.stack import Stack
 from pbrdf.inversion.starts import sobol_starts
 from pbrdf.inversion.unknowns import bounds_of_each, check_choices, space_of, with_terms
@@ -131,14 +131,15 @@ max_iterations, share, correlation
             like.with_covariance(covariance)
         space, begin = space_of(model, options or {}, fix or {}, free, bounds or {}, start or {}, like)
         space = with_terms(space, like, priors or {}, {}, terms, bounds or {}, loss)
-        share = (share,) if isinstance(share, str) else tuple(share)
+        share = [share] if isinstance(share, str) else list(dict.fromkeys(share))
         for name in share:
             if name not in space.names:
                 raise FitError(f"share: {name!r} is not a free parameter; free are {', '.join(space.names)}")
-        if like.count <= len(space.free) - len(set(share)):
+        own = len(space.free) - len(share)
+        if like.count <= own:
             raise FitError(
-                f"{like.count} measured values cannot determine {len(space.free) - len(set(share))} parameters of a "
-                "pixel: measure more, or fix parameters"
+                f"{like.count} measured values cannot determine {own} parameters of a pixel: measure more, or fix "
+                "parameters"
             )
         shown = space.build(0.5 * (space.lower + space.upper))
         settings = {
@@ -160,7 +161,7 @@ max_iterations, share, correlation
             "covariance": None if covariance is None else hashlib.sha256(covariance.tobytes()).hexdigest(),
             "seed": int(seed),
             "max_iterations": int(max_iterations),
-            "share": list(share),
+            "share": share,
             "labels": labels,
             "correlation": bool(correlation),
         }
@@ -284,7 +285,7 @@ max_iterations, share, correlation
         if not self.settings["share"]:
             return self
         few, labels, low, high = self._first_pass(blocks)
-        columns = np.array([self.space.names.index(name) for name in self.settings["share"]])
+        columns = self._shared_columns
         priors = self._shared_space
 
         def evaluate(theta: np.ndarray, parts: Iterable[_Part]) -> Sums:
@@ -292,8 +293,7 @@ max_iterations, share, correlation
             for part in parts:
                 pixels = self._pixels(part, theta, labels)
                 ends = fit_pixels(pixels, part.shape, part.places, part.freedom, part.stack.std_known)
-                margin = BOUND_MARGIN * (pixels.high - pixels.low)
-                inside = (ends.u > pixels.low + margin) & (ends.u < pixels.high - margin)
+                inside = ~np.logical_or(*on_bounds(ends.u, pixels.low, pixels.high))
                 total = total + sums_of(
                     np.searchsorted(labels, part.label),
                     len(labels),
@@ -323,19 +323,14 @@ max_iterations, share, correlation
         theta, sums, converged, passes = newton(
             lambda at: evaluate(at, (p for p in map(self._part, blocks) if p is not None)), begin, low, high
         )
-        margin = BOUND_MARGIN * (high - low)
-        inside = (theta > low + margin) & (theta < high - margin)
-        spreads = [
-            spread_of(t[None], A[None], a[None], b[None], np.ones(1)).covariance[0]
-            for t, A, a, b in zip(theta, sums.curvature, low, high, strict=True)
-        ]
+        inside = ~np.logical_or(*on_bounds(theta, low, high))
         shared = Shared(
             columns=columns,
             labels=labels,
             unknowns=theta,
             low=low,
             high=high,
-            covariance=np.stack(spreads),
+            covariance=spread_of(theta, sums.curvature, low, high, np.ones(len(labels))).covariance,
             chi2=2.0 * sums.cost,
             freedom=(sums.values - sums.own - inside.sum(axis=1)).astype(int),
             std_known=sums.guessed == 0,
@@ -354,7 +349,7 @@ max_iterations, share, correlation
         self, blocks: Iterable[xr.Dataset]
     ) -> tuple[list[_Part], np.ndarray, np.ndarray, np.ndarray]:
         """Some pixels of each label; the labels; and the bounds of the shared unknowns, shape (L, S)."""
-        columns = [self.space.names.index(name) for name in self.settings["share"]]
+        columns = self._shared_columns
         limits: dict[int, tuple[np.ndarray, np.ndarray]] = {}
         held: dict[int, int] = {}
         few = []
@@ -406,9 +401,14 @@ max_iterations, share, correlation
         return len(self.space.free) - len(self.settings["share"])
 
     @property
+    def _shared_columns(self) -> np.ndarray:
+        """Which of the free parameters pixels share."""
+        return np.array([self.space.names.index(name) for name in self.settings["share"]], dtype=int)
+
+    @property
     def _shared_space(self) -> Space:
         """The shared parameters alone, with their priors."""
-        columns = [self.space.names.index(name) for name in self.settings["share"]]
+        columns = self._shared_columns
         return replace(
             self.space,
             free=tuple(self.space.free[c] for c in columns),
@@ -451,7 +451,7 @@ max_iterations, share, correlation
         space, starts = self.space, self.settings["starts"]
         if theta is not None:
             known = labels if labels is not None else self.shared.labels  # type: ignore[union-attr]
-            columns = [self.space.names.index(name) for name in self.settings["share"]]
+            columns = self._shared_columns
             low[:, columns] = high[:, columns] = theta[np.searchsorted(known, part.label)]
             # a prior of what is shared counts once, not for each pixel
             terms = [replace(t, prior=None) if c in columns else t for c, t in enumerate(space.terms)]
@@ -472,7 +472,7 @@ max_iterations, share, correlation
     def _store(self, ends: Ends, pixels: Pixels, part: _Part, flat: Mapping[str, np.ndarray]) -> None:
         """Estimates and all that is said of them, into the arrays of a block."""
         space, reached, usable = self.space, ends.reached, part.usable
-        converged = np.isin(ends.status, [s for s in Status if s.converged])
+        converged = ends.converged
         chi2 = 2.0 * ends.cost
         low, high, common = pixels.low, pixels.high, None
         scale = np.where(part.stack.std_known, 1.0, chi2 / part.freedom)

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -193,15 +194,7 @@ def _offer(pixels: Pixels, ends: Ends, beside: np.ndarray, chosen: np.ndarray) -
     more = old.reached.astype(int)
     ends.put(
         number[better],
-        Ends(
-            found.u,
-            found.cost,
-            found.information,
-            found.gradient,
-            found.status,
-            np.maximum(old.optima, found.optima + more),
-            old.starts + 1,
-        )[better],
+        replace(found, optima=np.maximum(old.optima, found.optima + more), starts=old.starts + 1)[better],
     )
     return number[better]
 

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from pbrdf.inversion.problem import Space
+from pbrdf.inversion.problem import Space, prior_residuals
 
 __all__ = ["Shared", "Sums", "described", "newton", "sums_of", "with_priors"]
 
@@ -163,16 +163,18 @@ def sums_of(
 
 def with_priors(sums: Sums, space: Space, unknowns: np.ndarray) -> Sums:
     """With the priors of the shared parameters, which count once for each label."""
-    values = space.to_parameters(unknowns)
-    slope = space.derivative(values)
-    cost, gradient, curvature = sums.cost.copy(), sums.gradient.copy(), sums.curvature.copy()
-    for c, term in enumerate(space.terms):
-        if term.prior is not None:
-            r, J = (values[:, c] - term.prior[0]) / term.prior[1], slope[:, c] / term.prior[1]
-            cost += 0.5 * r * r
-            gradient[:, c] += r * J
-            curvature[:, c, c] += J * J
-    return replace(sums, cost=cost, gradient=gradient, curvature=curvature)
+    penalty = prior_residuals(space)
+    if penalty is None:
+        return sums
+    r, slope = penalty(unknowns)
+    curvature, every = sums.curvature.copy(), range(r.shape[1])
+    curvature[:, every, every] += slope**2
+    return replace(
+        sums,
+        cost=sums.cost + 0.5 * (r * r).sum(axis=1),
+        gradient=sums.gradient + slope * r,
+        curvature=curvature,
+    )
 
 
 def newton(

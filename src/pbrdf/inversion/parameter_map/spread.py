@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pbrdf.inversion.parameter_map.layout import FLAGS
-from pbrdf.inversion.solver import BOUND_MARGIN
+from pbrdf.inversion.solver import on_bounds
 from pbrdf.inversion.statistics import covariance, prior_spread
 
 __all__ = ["Spread", "spread_of"]
@@ -56,8 +56,7 @@ def spread_of(
         Columns of the unknowns that were found from all pixels, shape (S,), and their covariance C, (B, S, S): with
         K = −A_φφ⁻¹ A_φθ, A being the information, the pixel's own have A_φφ⁻¹ + K C Kᵀ, and K C with the shared ones.
     """
-    margin = BOUND_MARGIN * (high - low)
-    at_low, at_high = u <= low + margin, u >= high - margin
+    at_low, at_high = on_bounds(u, low, high)
     inside = ~(at_low | at_high)
     prior = prior_spread(low, high)
     own = inside
