@@ -85,5 +85,5 @@ def test_what_is_no_library(tmp_path):
     (tmp_path / "text.json").write_text("white, 1.5")
     with pytest.raises(DataError, match="not JSON"):
         read_library(tmp_path / "text.json")
-    with pytest.raises(DataError, match="cannot be read"):
+    with pytest.raises(DataError, match=r"none\.json: cannot be read"):
         read_library(tmp_path / "none.json")

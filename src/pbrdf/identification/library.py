@@ -149,8 +149,9 @@ def read_library(path: str | os.PathLike[str]) -> Library:
         If the file cannot be read, is no library, or one of its materials is damaged; file and material are named.
     """
     file = Path(path)
+    text = utf8(file, read_bytes(file))
     try:
-        content = json.loads(utf8(file, read_bytes(file)))
+        content = json.loads(text)
     except ValueError as error:
         raise DataError(f"{file}: not JSON, so not a library of materials: {error}") from error
     if not isinstance(content, dict) or content.get("format") != FORMAT:
