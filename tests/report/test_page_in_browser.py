@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import pytest
-from browser import Browser, chromium
 
+from browser import Browser, chromium
 from pbrdf.report.fit.folder import write_report
 
 # Elements that are pictures, and the text that a screen reader has for each.

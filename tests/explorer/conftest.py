@@ -1,0 +1,79 @@
+"""An explorer served in a thread, and Chromium to open it in."""
+
+import asyncio
+import threading
+
+import pytest
+
+import pbrdf
+from browser import chromium
+
+playwright = pytest.importorskip("playwright.sync_api")
+# WebGL2 without a graphics card
+FLAGS = ("--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+
+
+@pytest.fixture
+def served():
+    """A function that serves what a workspace makes and gives the address with its token."""
+    from pbrdf.explorer.server import serve
+
+    running = []
+
+    def start(open_workspace):
+        ready = threading.Event()
+        address = []
+        loop = asyncio.new_event_loop()
+
+        def tell(text):
+            address.append(text)
+            ready.set()
+
+        def run():
+            asyncio.set_event_loop(loop)
+            task = loop.create_task(serve(open_workspace, 0, tell))
+            running.append((loop, task, threading.current_thread()))
+            try:
+                loop.run_until_complete(task)
+            except asyncio.CancelledError:
+                pass
+            finally:
+                loop.close()
+
+        threading.Thread(target=run, daemon=True).start()
+        assert ready.wait(30)
+        return address[0]
+
+    yield start
+    for loop, task, thread in running:
+        loop.call_soon_threadsafe(task.cancel)
+        thread.join(10)
+
+
+@pytest.fixture(scope="session")
+def chrome():
+    """Chromium without a window."""
+    program = chromium()
+    if program is None:
+        pytest.skip("no Chromium or Chrome on this machine (apt-get install chromium)")
+    with playwright.sync_playwright() as p:
+        browser = p.chromium.launch(executable_path=program, args=list(FLAGS))
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def page(chrome):
+    """A new tab; the test fails where a script of the page did."""
+    context = chrome.new_context(viewport={"width": 1280, "height": 800})
+    tab = context.new_page()
+    faults = []
+    tab.on("pageerror", lambda error: faults.append(str(error)))
+    yield tab
+    context.close()
+    assert faults == []
+
+
+@pytest.fixture
+def white():
+    return pbrdf.load_paint("matte-white-thick")
