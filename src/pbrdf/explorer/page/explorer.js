@@ -7,6 +7,7 @@ function render({ model, el }) {
   el.append(message);
   app.on("answer:error", content => { message.textContent = content.text; });
   app.on("disconnected", () => { message.textContent = "The program behind this page has ended; start it again with pbrdf explore."; });
+  app.on("drawn", () => el.dispatchEvent(new CustomEvent("pbrdf-drawn", { bubbles: true })));
   app.on("answer:welcome", content => {
     app.catalogue = content.catalogue;
     const side = element("aside", { "aria-label": "Controls" }), stage = element("section", { "aria-label": "Views" });
