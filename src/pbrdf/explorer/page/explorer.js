@@ -7,7 +7,6 @@ function render({ model, el }) {
   el.append(message);
   app.on("answer:error", content => { message.textContent = content.text; });
   app.on("disconnected", () => { message.textContent = "The program behind this page has ended; start it again with pbrdf explore."; });
-  app.on("drawn", () => el.dispatchEvent(new CustomEvent("pbrdf-drawn", { bubbles: true })));
   app.on("answer:welcome", content => {
     app.catalogue = content.catalogue;
     const side = element("aside", { "aria-label": "Controls" }), stage = element("section", { "aria-label": "Views" });
@@ -23,7 +22,7 @@ function render({ model, el }) {
       stage.append(place);
       return [view.name, view.build(place, app)];
     }));
-    app.shownViews = () => [...built.keys()];
+    app.shownViews = () => app.state.settings.page?.views ?? [...built.keys()];
     for (const [name, view] of built) app.on(`picture:${name}`, (header, buffers) => view.show(header, buffers));
     app.on("state", () => panels.forEach(panel => panel.update(app.state)));
     app.state = content.state ?? null;
