@@ -248,6 +248,7 @@ function colourBar(tables) {
   const ends = [0, 1, 2].map(() => element("span"));
   let shown = "";
   return {
+    ends: [ends[0], ends[2]],
     node: element("div", { class: "colour-bar" }, bar, element("div", { class: "ends" }, ...ends)),
     show(picture, range) {
       if (shown !== picture.colours) {
