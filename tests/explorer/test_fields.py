@@ -70,7 +70,7 @@ def compare(shown, quantities, dragging=False, tolerance=6e-4):
     for picture in pictures:
         for half, expected in zip(whole(picture, planes), truths, strict=True):
             assert_shown(half, expected(picture.quantity), picture.quantity, expected("dolp"), tolerance)
-            inside = half[: round(0.95 * (GRID.zeniths - 1)) + 1]
+            inside = half[: int(0.95 * (GRID.zeniths - 1)) + 1]
             if picture.quantity != "aolp":
                 assert picture.extent[0] <= inside.min()
                 assert inside.max() <= picture.extent[1]

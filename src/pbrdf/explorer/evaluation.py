@@ -230,7 +230,7 @@ def fields(
 
 def _extent(plane: np.ndarray) -> tuple[float, float]:
     """Least and largest number of a plane to 85.5°: along the horizon there is no light."""
-    seen = plane[: round(0.95 * (len(plane) - 1)) + 1].astype(np.float32)
+    seen = plane[: int(0.95 * (len(plane) - 1)) + 1].astype(np.float32)
     return float(np.fmin.reduce(seen, axis=None)), float(np.fmax.reduce(seen, axis=None))
 
 
@@ -255,10 +255,12 @@ def described(picture: Picture, difference: bool) -> dict[str, Any]:
     else:
         colours = "sequential" if (logarithmic or picture.quantity == "dolp") and not difference else "signed"
     title = _LABELS[picture.quantity]
+    symbol = title.split(",")[0]
     if difference:
-        title = f"log₁₀ of the ratio of {title.split(',')[0]}" if logarithmic else f"Difference of {title}"
+        title = f"log₁₀ of the ratio of {symbol}" if logarithmic else f"Difference of {title}"
     return {
         "quantity": picture.quantity,
+        "symbol": symbol.split("/m")[0],
         "title": title,
         "plane": picture.plane,
         "mirrored": picture.mirrored,
