@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import secrets
+import threading
 from collections.abc import Callable
 from typing import Any
 from urllib.parse import urlsplit
@@ -14,6 +15,7 @@ import tornado.web
 import tornado.websocket
 
 from pbrdf.errors import DataError
+from pbrdf.explorer.catalogue import catalogue
 from pbrdf.explorer.messages import pack, unpack
 from pbrdf.explorer.module import PAGE, module_text
 from pbrdf.explorer.session import Session
@@ -131,6 +133,8 @@ async def serve(workspace: Callable[[], Workspace], port: int, ready: Callable[[
     )
     server = tornado.httpserver.HTTPServer(application, max_body_size=1 << 16)
     server.add_sockets(sockets)
+    # what the first page asks for is put together while the browser opens
+    threading.Thread(target=catalogue, name="pbrdf catalogue").start()
     try:
         ready(f"http://127.0.0.1:{bound}/?token={token}")
         await asyncio.Event().wait()
