@@ -22,7 +22,7 @@ function render({ model, el }) {
       stage.append(place);
       return [view.name, view.build(place, app)];
     }));
-    app.shownViews = () => app.state.settings.page?.views ?? [...built.keys()];
+    app.shownViews = () => [...built.keys()];
     for (const [name, view] of built) app.on(`picture:${name}`, (header, buffers) => view.show(header, buffers));
     app.on("state", () => panels.forEach(panel => panel.update(app.state)));
     app.state = content.state ?? null;
