@@ -21,7 +21,11 @@ __all__ = ["REQUESTS", "VIEWS", "Emit", "Session"]
 #: Sends a JSON object and buffers to the page, from any thread.
 Emit = Callable[[Mapping[str, Any], Sequence[bytes | memoryview]], None]
 #: Modules of the views by name; each has ``draw(state, workspace, dragging)`` that gives a header and buffers.
-VIEWS = {"hemisphere": "pbrdf.explorer.views.hemisphere"}
+VIEWS = {
+    "hemisphere": "pbrdf.explorer.views.hemisphere",
+    "sphere": "pbrdf.explorer.views.sphere",
+    "polar": "pbrdf.explorer.views.polar",
+}
 #: Modules that answer the other requests, by the request's type; each has
 #: ``answer(request, buffers, workspace, emit)``.
 REQUESTS: dict[str, str] = {}

@@ -1,0 +1,35 @@
+// What views have in common beside fields: a bar of the colours with its ends in words, canvases as sharp as the screen.
+
+class ColourLegend {
+  constructor() {
+    this.bar = element("canvas", { width: 256, height: 1, "aria-hidden": "true" });
+    Object.assign(this.bar.style, { width: "100%", height: "10px", display: "block" });
+    this.least = element("span", {});
+    this.about = element("span", {});
+    this.most = element("span", {});
+    const words = element("div", {}, this.least, this.about, this.most);
+    Object.assign(words.style, { display: "flex", justifyContent: "space-between", gap: "1em" });
+    this.node = element("div", { class: "view-legend" }, this.bar, words);
+  }
+
+  // `table` has 256 colours, or is null where the picture is grey; `ends` are the numbers at both ends.
+  show(table, ends, unit, about) {
+    this.bar.style.visibility = table ? "visible" : "hidden";
+    if (table && this.table !== table) this.bar.getContext("2d").putImageData(new ImageData(new Uint8ClampedArray(table), 256, 1), 0, 0);
+    this.table = table ?? this.table;
+    [this.least.textContent, this.most.textContent] = table ? ends.map(end => `${written(end)} ${unit}`) : ["\u00a0", "\u00a0"];
+    this.about.textContent = about;
+  }
+}
+
+// Give a canvas as many pixels as the screen has there, and draw again whenever that changes.
+function keepSharp(canvas, redraw, most = 1600) {
+  new ResizeObserver(() => {
+    const ratio = window.devicePixelRatio || 1, scale = Math.min(ratio, most / Math.max(canvas.clientWidth, 1));
+    const width = Math.round(canvas.clientWidth * scale), height = Math.round(canvas.clientHeight * scale);
+    if (!width || !height || (canvas.width === width && canvas.height === height)) return;
+    canvas.width = width;
+    canvas.height = height;
+    redraw();
+  }).observe(canvas);
+}

@@ -1,0 +1,246 @@
+// A ball as a polarisation camera sees it: radiance, behind a polariser that is turned, degree and angle of
+// polarisation. The Stokes vectors come in the camera's axes, the polarisers as vectors to multiply them with.
+
+const BALL = `#version 300 es
+precision highp float;
+in vec2 at;
+uniform sampler2D field, other, table;
+uniform vec4 analyser;
+uniform vec2 range, handle;
+uniform float azimuth, rim, gain, pixel;
+uniform int mode;
+uniform bool difference, handled;
+out vec4 colour;
+const float PI = 3.14159265, MARGIN = 1.02;
+
+// radiance and its shares Q, U, V at a place of the ball
+vec4 seen(sampler2D values, float zenith, float turn) {
+  vec2 size = vec2(textureSize(values, 0));
+  vec2 cell = vec2(turn / (2.0 * PI), min(zenith / rim, 1.0)) * (size - 1.0) + 0.5;
+  return texture(values, cell / size);
+}
+
+float shown(vec4 s) {
+  if (mode == 0) return s.x;
+  if (mode == 1) return s.x * dot(analyser, vec4(1.0, s.yzw));
+  if (mode == 2) return length(s.yz);
+  if (mode == 3) return mod(0.5 * atan(s.z, s.y), PI);
+  return s.w;
+}
+
+vec3 toned(float radiance) {
+  float x = 1.0 - exp(-gain * radiance);
+  return vec3(x <= 0.0031308 ? 12.92 * x : 1.055 * pow(x, 1.0 / 2.4) - 0.055);
+}
+
+vec3 coloured(float value) {
+  return texture(table, vec2((value - range.x) / (range.y - range.x), 0.5)).rgb;
+}
+
+void main() {
+  vec2 w = (2.0 * at - 1.0) * MARGIN;
+  float radius = length(w);
+  float cover = clamp((1.0 - radius) / pixel + 0.5, 0.0, 1.0);
+  float zenith = asin(min(radius, 1.0)), turn = mod(atan(w.y, w.x) - azimuth, 2.0 * PI);
+  vec4 s = seen(field, zenith, turn);
+  float value = shown(s);
+  vec3 picture;
+  if (s.x <= 0.0 && mode > 1) picture = vec3(0.25);
+  else if (difference) {
+    vec4 t = seen(other, zenith, turn);
+    float step = value - shown(t);
+    if (mode == 3) step -= PI * round(step / PI);
+    picture = coloured(step);
+  } else if (mode < 2) picture = toned(value);
+  else if (mode == 3) picture = mix(vec3(0.5), coloured(value), smoothstep(0.0, 0.01, length(s.yz)));
+  else picture = coloured(value);
+  if (handled) {
+    float ring = abs(length(w - handle) - 0.06) / pixel;
+    picture = mix(vec3(ring < 1.2 ? 0.0 : 1.0), picture, smoothstep(2.0, 3.0, ring));
+  }
+  colour = vec4(picture * cover, cover);
+}`;
+
+// What each mode of the picture shows: colours, whether its range comes with the picture, units.
+const BALL_MODES = {
+  radiance: { title: "Radiance", unit: "sr⁻¹", scale: 1 },
+  polariser: { title: "Behind a polariser", unit: "sr⁻¹", scale: 1 },
+  dolp: { title: "Degree of linear polarisation", unit: "%", scale: 100 },
+  aolp: { title: "Angle of linear polarisation", unit: "°", scale: 180 / Math.PI },
+  circular: { title: "Circular part V/I", unit: "%", scale: 100 },
+};
+
+// The number that 16 bits of a float16 stand for.
+function halfNumber(bits) {
+  const exponent = bits >> 10 & 31, fraction = bits & 1023, sign = bits >> 15 ? -1 : 1;
+  return sign * (exponent ? 2 ** (exponent - 15) * (1 + fraction / 1024) : 2 ** -14 * fraction / 1024);
+}
+
+// Four channels of a float16 field between its grid points, as the graphics card interpolates.
+function between(view, [rows, columns], row, column) {
+  const y = Math.min(Math.max(row, 0), rows - 1), x = Math.min(Math.max(column, 0), columns - 1);
+  const y0 = Math.floor(y), x0 = Math.floor(x), y1 = Math.min(y0 + 1, rows - 1), x1 = Math.min(x0 + 1, columns - 1);
+  const at = (j, i, c) => halfNumber(view.getUint16(2 * (4 * (j * columns + i) + c), true));
+  const mixed = (a, b, t) => a + (b - a) * t;
+  return [0, 1, 2, 3].map(c => mixed(mixed(at(y0, x0, c), at(y0, x1, c), x - x0), mixed(at(y1, x0, c), at(y1, x1, c), x - x0), y - y0));
+}
+
+VIEWS.push({
+  name: "sphere",
+  title: "Lit ball",
+  build(place, app) {
+    const canvas = element("canvas", { width: 450, height: 450, role: "img", "aria-label": "A lit ball as a polarisation camera sees it" });
+    Object.assign(canvas.style, { width: "100%", aspectRatio: "1", touchAction: "none", cursor: "move", display: "block" });
+    const graphics = new Graphics(canvas, BALL);
+    graphics.gl.enable(graphics.gl.BLEND);
+    graphics.gl.blendFunc(graphics.gl.ONE, graphics.gl.ZERO);
+    const tables = Object.fromEntries(Object.entries(app.catalogue.colours).map(([name, text]) => [name, decoded(text)]));
+    let header = null, fields = [], polarisers = null, handled = false, table = "";
+
+    const settings = () => ({ mode: "radiance", polariser: 0, exposure: 0, ...app.state?.settings.sphere });
+    const lamp = () => {
+      const [polar, azimuth] = header?.lamp ?? [0, 0];
+      return { polar, azimuth, ...app.state?.settings.sphere?.light };
+    };
+    const set = (values, dragging, views) => app.change(state => {
+      state.settings.sphere = { ...state.settings.sphere, ...values };
+    }, { dragging, views });
+    // what the page alone draws needs no picture from Dr.Jit
+    const show = (name, value, dragging = false) => set({ [name]: value }, dragging, []);
+    const light = (values, dragging) => set({ light: { ...lamp(), ...values } }, dragging, ["sphere"]);
+
+    const slider = (name, title, min, max, step, change) => {
+      const id = freshId(`sphere-${name}`), input = element("input", { type: "range", id, name: `sphere-${name}`, min, max, step,
+        oninput: event => change(Number(event.target.value), true), onchange: event => change(Number(event.target.value), false) });
+      const output = element("output", { for: id });
+      const row = element("div", { class: "view-setting" }, element("label", { for: id }, title), input, output);
+      return { row, input, output };
+    };
+    const modeId = freshId("sphere-mode");
+    const mode = element("select", { id: modeId, name: "sphere-mode", onchange: event => show("mode", event.target.value) },
+      Object.entries(BALL_MODES).map(([name, { title }]) => element("option", { value: name }, title)));
+    const dial = slider("polariser", "Polariser", 0, 180, 0.5, (value, dragging) => show("polariser", value, dragging));
+    const exposure = slider("exposure", "Exposure", -8, 8, 0.25, (value, dragging) => show("exposure", value, dragging));
+    const polar = slider("polar", "Lamp from camera", 0, 180, 1, (value, dragging) => light({ polar: value }, dragging));
+    const azimuth = slider("azimuth", "Lamp around", 0, 360, 1, (value, dragging) => light({ azimuth: value }, dragging));
+    const legend = new ColourLegend();
+    const readout = element("p", { class: "view-readout" });
+    const about = element("p", { class: "view-note" }, "Drag on the ball to move the lamp. Angles of polarisation and polariser count from level, counterclockwise.");
+    place.append(
+      element("div", { class: "view-setting" }, element("label", { for: modeId }, "Shows"), mode),
+      dial.row, canvas, legend.node, readout, exposure.row, polar.row, azimuth.row, about,
+    );
+
+    function range() {
+      const { mode } = settings(), both = fields.length > 1;
+      if (mode === "aolp") return both ? [-Math.PI / 2, Math.PI / 2] : [0, Math.PI];
+      const most = header.ranges[mode === "polariser" ? "radiance" : mode];
+      return both || mode === "circular" ? [-most, most] : [0, most];
+    }
+
+    function redraw() {
+      if (!header) return;
+      const chosen = settings(), both = fields.length > 1, known = BALL_MODES[chosen.mode];
+      if (!known) return;
+      const gl = graphics.gl, index = Object.keys(BALL_MODES).indexOf(chosen.mode);
+      const wanted = both || chosen.mode === "circular" ? "signed" : chosen.mode === "aolp" ? "cyclic" : "sequential";
+      if (table !== wanted) { graphics.colours("table", tables[wanted]); table = wanted; }
+      // the dial stands between two of the polarisers at most by rounding
+      const step = Math.round(chosen.polariser % 180 / 180 * (polarisers.length / 4 - 1));
+      graphics.vector("analyser", polarisers.subarray(4 * step, 4 * step + 4));
+      graphics.integer("mode", index);
+      graphics.integer("difference", both ? 1 : 0);
+      graphics.integer("handled", handled ? 1 : 0);
+      graphics.vector("range", range());
+      graphics.number("rim", header.rim);
+      graphics.number("gain", Math.PI * 2 ** chosen.exposure);
+      graphics.number("azimuth", header.lamp[1] * Math.PI / 180);
+      graphics.number("pixel", 2.04 / canvas.width);
+      graphics.vector("handle", highlight());
+      gl.viewport(0, 0, canvas.width, canvas.height);
+      gl.drawArrays(gl.TRIANGLES, 0, 3);
+      const tone = !both && index < 2;
+      legend.show(tone ? null : tables[wanted], range().map(v => v * known.scale), known.unit,
+        both ? `${header.models[0]} − ${header.models[1]}` : known.title);
+    }
+
+    // where the ball mirrors the lamp, from its middle in radii
+    function highlight() {
+      const { polar, azimuth } = lamp(), radius = Math.sin(polar * Math.PI / 360), a = azimuth * Math.PI / 180;
+      return [radius * Math.cos(a), radius * Math.sin(a)];
+    }
+
+    function update() {
+      const chosen = settings(), { polar: p, azimuth: a } = lamp();
+      mode.value = chosen.mode;
+      dial.row.hidden = chosen.mode !== "polariser";
+      exposure.row.hidden = fields.length > 1 || !["radiance", "polariser"].includes(chosen.mode);
+      for (const [{ input, output }, value, text] of [
+        [dial, chosen.polariser, `${written(chosen.polariser, 4)}°`], [exposure, chosen.exposure, `${written(chosen.exposure)} stops`],
+        [polar, p, `${Math.round(p)}°`], [azimuth, a, `${Math.round(a)}°`],
+      ]) { input.value = value; output.value = text; input.setAttribute("aria-valuetext", text); }
+      redraw();
+    }
+
+    const pointed = event => {
+      const box = canvas.getBoundingClientRect();
+      return [(2 * (event.clientX - box.left) / box.width - 1) * 1.02, (1 - 2 * (event.clientY - box.top) / box.height) * 1.02];
+    };
+
+    function read(event) {
+      const [x, y] = pointed(event), radius = Math.hypot(x, y);
+      if (!header || radius > 1) { readout.textContent = "\u00a0"; return; }
+      const turn = (Math.atan2(y, x) - header.lamp[1] * Math.PI / 180 + 4 * Math.PI) % (2 * Math.PI);
+      const [rows, columns] = header.shape;
+      readout.textContent = fields.map((field, i) => {
+        const [L, q, u, v] = between(field, header.shape, Math.asin(radius) / header.rim * (rows - 1), turn / (2 * Math.PI) * (columns - 1));
+        const angle = (Math.atan2(u, q) / 2 * 180 / Math.PI + 180) % 180;
+        const name = fields.length > 1 ? `${header.models[i]}: ` : "";
+        if (L <= 0) return `${name}in the shadow`;
+        return `${name}${written(L)} sr⁻¹, DoLP ${written(100 * Math.hypot(q, u))} %, AoLP ${angle.toFixed(1)}°, V/I ${written(100 * v)} %`;
+      }).join("; ");
+    }
+
+    let grip = null;
+    const drop = event => {
+      if (grip?.moved) light({}, false);
+      grip = null;
+      handled = event.type !== "pointerleave" && event.pointerType === "mouse";
+      redraw();
+    };
+    canvas.addEventListener("pointerdown", event => {
+      if (event.button) return;
+      canvas.setPointerCapture(event.pointerId);
+      grip = { x: event.clientX, y: event.clientY, moved: false };
+    });
+    canvas.addEventListener("pointermove", event => {
+      read(event);
+      if (!handled) { handled = true; redraw(); }
+      if (!grip) return;
+      // a click that trembles moves nothing
+      grip.moved ||= Math.hypot(event.clientX - grip.x, event.clientY - grip.y) > 4;
+      if (!grip.moved) return;
+      const [x, y] = pointed(event);
+      const polar = 2 * Math.asin(Math.min(Math.hypot(x, y), 1)) * 180 / Math.PI, around = Math.atan2(y, x) * 180 / Math.PI;
+      light({ polar: Number(polar.toFixed(1)), azimuth: Number(((around + 360) % 360).toFixed(1)) }, true);
+    });
+    canvas.addEventListener("pointerup", drop);
+    canvas.addEventListener("pointercancel", drop);
+    canvas.addEventListener("pointerleave", event => { if (!grip) { readout.textContent = "\u00a0"; drop(event); } });
+    readout.textContent = "\u00a0";
+    keepSharp(canvas, redraw);
+    app.on("state", update);
+    return {
+      show(content, buffers) {
+        if (content.error) return;
+        header = content;
+        fields = buffers.slice(0, -1);
+        const last = buffers.at(-1);
+        polarisers = new Float32Array(last.buffer.slice(last.byteOffset, last.byteOffset + last.byteLength));
+        graphics.field("field", fields[0], ...header.shape);
+        graphics.field("other", fields.at(-1), ...header.shape);
+        update();
+      },
+    };
+  },
+});

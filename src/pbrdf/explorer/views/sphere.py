@@ -1,0 +1,207 @@
+"""A ball as a polarisation camera sees it: one distant lamp, an orthographic camera, interreflections none.
+
+Frames, of docs/conventions.md and :mod:`pbrdf.instruments.pixel_geometry`:
+
+* Stokes vectors of the picture refer to the camera's axes, x level to the right and y up, light along x × y.
+* The state's light refers to (p, s) at the middle of the ball, which faces the camera: p lies in the plane of lamp and
+  line of sight. At other places the same light is read in the (p, s) of that place.
+
+The grid goes by the zenith angle of the camera (rows) and around the ball from the lamp's side (columns), so that light
+without U and V, whose picture is its own mirror image, needs half of the directions.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from pbrdf.errors import DataError
+from pbrdf.explorer.state import Light, State, StateError, number
+from pbrdf.explorer.workspace import Workspace
+from pbrdf.instruments.goniometer.rays import UPRIGHT, across, angles_of
+from pbrdf.instruments.pixel_geometry.camera import Lamp, PixelCamera
+from pbrdf.instruments.pixel_geometry.geometry import plane_rotation
+from pbrdf.models.base import Model
+from pbrdf.optics.elements import diattenuator, rotate_frame
+
+__all__ = ["LAMP", "MODES", "POLARISERS", "draw", "picture"]
+
+#: Angles of the lamp where the state names none, degrees: above on the left, as draughtsmen have it.
+LAMP = (40.0, 120.0)
+#: What is shown of each pixel's Stokes vector.
+MODES = ("radiance", "polariser", "dolp", "aolp", "circular")
+#: Rows and columns of half a turn, at rest and while a slider is dragged.
+REST, DRAGGED = (121, 121), (91, 91)
+#: Zenith angle of the outermost row and the largest angle of incidence that is evaluated, degrees: at 90° f is 0.
+RIM = 89.5
+#: Polarisers of the dial, each a row of four numbers whose product with a Stokes vector is what it lets pass; of
+#: half a degree each, over half a turn and with its end.
+POLARISERS = 361
+#: Largest number of float16, about.
+_MOST = 6.0e4
+_MIRROR = np.array([1.0, 1.0, -1.0, -1.0])
+
+
+class _Ball(NamedTuple):
+    """Angles of the grid (rows, columns of a turn) and changes of frame: to the camera's, its matrix dimensions first,
+    and from the light's.
+    """
+
+    theta_i: np.ndarray
+    theta_r: np.ndarray
+    phi: np.ndarray
+    cosine: np.ndarray
+    to_camera: np.ndarray
+    from_light: np.ndarray
+
+
+def draw(state: State, workspace: Workspace, dragging: bool) -> tuple[dict[str, Any], list[bytes]]:
+    """Radiance and Q/I, U/I, V/I in the camera's frame, shape (rows, columns, 4), float16.
+
+    One field of the active model, a second one of the model to compare it with where there is one; then the polarisers
+    of the dial, float32.
+    """
+    settings = state.settings.get("sphere", {})
+    lamp = _lamp(settings.get("light", {}))
+    _check_display(settings)
+    layers = [state.shown] if state.compare is None else [state.shown, state.layers[state.compare]]
+    shape = DRAGGED if dragging else REST
+    accuracy = "fast" if dragging else "default"
+    fields = [
+        picture(layer.model.with_accuracy(accuracy), lamp, state.light, state.part, shape) for layer in layers
+    ]
+    header = {
+        "shape": list(fields[0].shape),
+        "channels": ["radiance", "q", "u", "v"],
+        "rim": math.radians(RIM),
+        "ranges": _ranges(fields),
+        "lamp": [math.degrees(lamp.polar), math.degrees(lamp.azimuth)],
+        "models": [layer.name for layer in layers],
+    }
+    return header, [*(field.astype("<f2").tobytes() for field in fields), _polarisers()]
+
+
+def picture(model: Model, lamp: Lamp, light: Light, part: str, shape: tuple[int, int]) -> np.ndarray:
+    """Radiance for unit irradiance across the beam (1/sr) and Q/I, U/I, V/I of it in the camera's frame.
+
+    Parameters
+    ----------
+    model
+        What the ball is painted with.
+    lamp
+        Where the light comes from.
+    light
+        Its Stokes vector, see the module's text; the angle of incidence is that of each place of the ball.
+    part
+        Part of the model.
+    shape
+        Rows, from the middle of the ball to its rim at :data:`RIM`, and columns of half a turn.
+
+    Returns
+    -------
+    ndarray
+        Shape (rows, columns of a turn, 4). The columns go counterclockwise from the lamp's side, the last is the
+        first. Where no light falls the radiance is 0.
+    """
+    ball = _ball(lamp.polar, lamp.azimuth, *shape)
+    halved = light.stokes[2] == light.stokes[3] == 0.0
+    lit = slice(0, shape[1]) if halved else slice(None)
+    angles = (ball.theta_i[:, lit], ball.theta_r, ball.phi[:, lit])
+    if light.stokes[1] == 0.0 and halved:
+        S = model.stokes(*angles, incident=light.stokes, part=part)
+    else:
+        S = model.stokes(*angles, incident=ball.from_light[:, lit] @ np.array(light.stokes), part=part)
+    if halved:
+        S = np.concatenate([S, S[:, -2::-1] * _MIRROR], axis=1)
+    inverse = 1.0 / np.maximum(S[..., 0], 1e-30)
+    field = np.empty_like(S)
+    np.minimum(S[..., 0] * ball.cosine, _MOST, out=field[..., 0])
+    # only the part of the matrices that is not 0 and 1
+    for row in (1, 2):
+        turned = ball.to_camera[row, 1] * S[..., 1] + ball.to_camera[row, 2] * S[..., 2]
+        np.multiply(turned, inverse, out=field[..., row])
+    np.multiply(S[..., 3], inverse, out=field[..., 3])
+    return field
+
+
+@lru_cache(maxsize=4)
+def _ball(polar: float, azimuth: float, rows: int, half: int) -> _Ball:
+    """The grid under a lamp; kept, as sliders of a model leave the lamp where it is."""
+    lamp = Lamp(polar, azimuth)
+    theta_r = np.deg2rad(np.linspace(0.0, RIM, rows))[:, None]
+    around = azimuth + np.linspace(0.0, 2.0 * np.pi, 2 * half - 1)
+    normal = np.stack(
+        np.broadcast_arrays(
+            np.sin(theta_r) * np.cos(around), np.sin(theta_r) * np.sin(around), np.cos(theta_r)
+        ),
+        axis=-1,
+    )
+    view = PixelCamera().view(np.zeros(1), np.zeros(1))
+    source = lamp.direction
+    theta_i, _, phi = angles_of(normal, source, view)
+    to_camera = np.moveaxis(rotate_frame(-plane_rotation(normal, view, source)), (-2, -1), (0, 1)).copy()
+    # the light's own p is that of the middle of the ball, also where the lamp is beside the camera
+    level = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
+    p = -np.cos(polar) * level + np.array([0.0, 0.0, np.sin(polar)])
+    s = np.cross(p, source)  # p×s = k = −source
+    # lit along the normal φ is 0 and p points to the side of the camera; seen along it too, the reflected light's p is
+    # the camera's x, and that of the light its opposite
+    upright = across(view, source)
+    if np.linalg.norm(upright) < UPRIGHT:
+        upright = np.array([-1.0, 0.0, 0.0])
+    there = across(normal, source)
+    there = np.where(np.linalg.norm(there, axis=-1, keepdims=True) < UPRIGHT, upright, there)
+    chi = np.arctan2(there @ s, there @ p)
+    most = math.radians(RIM)
+    return _Ball(
+        np.minimum(theta_i, most), theta_r, phi, np.cos(theta_i).clip(0.0), to_camera, rotate_frame(chi)
+    )
+
+
+def _ranges(fields: list[np.ndarray]) -> dict[str, float]:
+    """Largest values that the colours of each mode stand for, in steps of 1, 2, 5."""
+    bright = np.all([field[..., 0] > 0.0 for field in fields], axis=0)
+    lit = [field[bright] for field in fields]
+    dolp = [np.hypot(field[..., 1], field[..., 2]) for field in lit]
+    if len(fields) == 1:
+        values = {"radiance": lit[0][..., 0], "dolp": dolp[0], "circular": lit[0][..., 3]}
+    else:
+        first, second = lit
+        values = {"radiance": first[..., 0] - second[..., 0], "dolp": dolp[0] - dolp[1]}
+        values["circular"] = first[..., 3] - second[..., 3]
+    return {name: _round_up(float(np.abs(v).max(initial=0.0))) for name, v in values.items()}
+
+
+def _round_up(value: float) -> float:
+    """The next number of the row …, 0.1, 0.2, 0.5, 1, …"""
+    power = 10.0 ** math.floor(math.log10(max(value, 1e-6)))
+    return next((step * power for step in (1.0, 2.0, 5.0) if value <= step * power), 10.0 * power)
+
+
+@lru_cache(maxsize=1)
+def _polarisers() -> bytes:
+    angles = np.linspace(0.0, np.pi, POLARISERS)
+    return diattenuator(angles)[:, 0].astype("<f4").tobytes()
+
+
+def _lamp(content: Any) -> Lamp:
+    if not isinstance(content, dict):
+        raise StateError("settings.sphere.light", "the lamp should be a JSON object")
+    polar = number(content.get("polar", LAMP[0]), "settings.sphere.light.polar")
+    azimuth = number(content.get("azimuth", LAMP[1]), "settings.sphere.light.azimuth")
+    try:
+        return Lamp(math.radians(polar), math.radians(azimuth % 360.0))
+    except DataError as error:
+        raise StateError("settings.sphere.light.polar", str(error)) from None
+
+
+def _check_display(settings: Any) -> None:
+    """Settings that the page alone uses come from addresses and files too."""
+    mode = settings.get("mode", MODES[0])
+    if mode not in MODES:
+        raise StateError("settings.sphere.mode", f"choose one of {', '.join(MODES)}")
+    for name in ("polariser", "exposure"):
+        number(settings.get(name, 0.0), f"settings.sphere.{name}")
