@@ -78,6 +78,7 @@ def draw(state: State, workspace: Workspace, dragging: bool) -> tuple[dict[str, 
         "channels": ["radiance", "q", "u", "v"],
         "rim": math.radians(RIM),
         "ranges": _ranges(fields),
+        "towards_lamp": lamp.direction.tolist(),
         "lamp": [math.degrees(lamp.polar), math.degrees(lamp.azimuth)],
         "models": [layer.name for layer in layers],
     }
@@ -177,7 +178,7 @@ def _ranges(fields: list[np.ndarray]) -> dict[str, float]:
 
 def _round_up(value: float) -> float:
     """The next number of the row …, 0.1, 0.2, 0.5, 1, …"""
-    power = 10.0 ** math.floor(math.log10(max(value, 1e-6)))
+    power = 10.0 ** math.floor(math.log10(max(value, 1e-3)))
     return next((step * power for step in (1.0, 2.0, 5.0) if value <= step * power), 10.0 * power)
 
 

@@ -157,8 +157,9 @@ VIEWS.push({
 
     // From places of the surface to the canvas: zoom and what stands in its middle.
     function projection() {
-      const { tilt } = settings(), wide = 1.42, zoom = Math.min(1 / wide, canvas.height / canvas.width / 0.98 * 1.3 / wide);
-      return { zoom: [zoom, zoom * canvas.width / canvas.height], middle: [0, 0.5 * Math.cos(tilt * Math.PI / 180)] };
+      const tilt = settings().tilt * Math.PI / 180, low = -1.2 * Math.abs(Math.sin(tilt)), high = Math.max(1.25 * Math.cos(tilt), -low);
+      const zoom = Math.min(1 / 1.4, canvas.height / canvas.width / ((high - low) / 2 + 0.06));
+      return { zoom: [zoom, zoom * canvas.width / canvas.height], middle: [0, (high + low) / 2] };
     }
 
     const strokes = gl.createBuffer(), slots = ["start", "end"].map(name => gl.getAttribLocation(graphics.program, name));

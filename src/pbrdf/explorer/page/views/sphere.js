@@ -6,6 +6,7 @@ precision highp float;
 in vec2 at;
 uniform sampler2D field, other, table;
 uniform vec4 analyser;
+uniform vec3 lamp;
 uniform vec2 range, handle;
 uniform float azimuth, rim, gain, pixel;
 uniform int mode;
@@ -45,7 +46,8 @@ void main() {
   vec4 s = seen(field, zenith, turn);
   float value = shown(s);
   vec3 picture;
-  if (s.x <= 0.0 && mode > 1) picture = vec3(0.25);
+  // between the grid's points the shadow has its own edge
+  if (mode > 1 && dot(lamp, vec3(w, sqrt(max(1.0 - radius * radius, 0.0)))) <= 0.0) picture = vec3(0.25);
   else if (difference) {
     vec4 t = seen(other, zenith, turn);
     float step = value - shown(t);
@@ -128,7 +130,7 @@ VIEWS.push({
     const about = element("p", { class: "view-note" }, "Drag on the ball to move the lamp. Angles of polarisation and polariser count from level, counterclockwise.");
     place.append(
       element("div", { class: "view-setting" }, element("label", { for: modeId }, "Shows"), mode),
-      dial.row, canvas, legend.node, readout, exposure.row, polar.row, azimuth.row, about,
+      canvas, legend.node, readout, dial.row, exposure.row, polar.row, azimuth.row, about,
     );
 
     function range() {
@@ -152,6 +154,7 @@ VIEWS.push({
       graphics.integer("difference", both ? 1 : 0);
       graphics.integer("handled", handled ? 1 : 0);
       graphics.vector("range", range());
+      graphics.vector("lamp", header.towards_lamp);
       graphics.number("rim", header.rim);
       graphics.number("gain", Math.PI * 2 ** chosen.exposure);
       graphics.number("azimuth", header.lamp[1] * Math.PI / 180);
