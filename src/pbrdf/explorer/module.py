@@ -14,7 +14,21 @@ __all__ = ["PAGE", "module_text"]
 #: Folder of the files.
 PAGE = Path(__file__).parent / "page"
 #: The files of the module, in order; a file uses names of those before it.
-PARTS = ("elements.js", "graphics.js", "application.js", "views/hemisphere.js", "controls.js", "explorer.js")
+PARTS = (
+    "elements.js",
+    "graphics.js",
+    "application.js",
+    "address.js",
+    "controls.js",
+    "files.js",
+    "views/hemisphere.js",
+    "panels/models.js",
+    "panels/parameters.js",
+    "panels/light.js",
+    "panels/quantities.js",
+    "empty.js",
+    "explorer.js",
+)
 
 
 @cache

@@ -15,7 +15,17 @@ from pbrdf.models.base import PARTS, Model
 from pbrdf.models.evaluation import check_incident
 from pbrdf.models.registry import MODELS
 
-__all__ = ["QUANTITIES", "VERSION", "Layer", "Light", "State", "StateError", "read_state"]
+__all__ = [
+    "MOST_LAYERS",
+    "QUANTITIES",
+    "VERSION",
+    "Layer",
+    "Light",
+    "State",
+    "StateError",
+    "read_layer",
+    "read_state",
+]
 
 #: Of the layout of the object; one of another version is refused in words.
 VERSION = 1
@@ -52,6 +62,10 @@ class Layer:
     model: Model
     shown: bool = True
 
+    def to_dict(self) -> dict[str, Any]:
+        """The layer as JSON, complete."""
+        return {"name": self.name, "shown": self.shown, **self.model.to_dict()}
+
 
 @dataclass(frozen=True)
 class State:
@@ -83,6 +97,19 @@ class State:
     part: str = "total"
     settings: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
+    def to_dict(self) -> dict[str, Any]:
+        """The state as JSON, complete: parameters and options that were left out have their defaults."""
+        return {
+            "version": VERSION,
+            "layers": [layer.to_dict() for layer in self.layers],
+            "active": self.active,
+            "compare": self.compare,
+            "light": {"theta_i": self.light.theta_i, "stokes": list(self.light.stokes)},
+            "quantities": list(self.quantities),
+            "part": self.part,
+            "settings": {name: dict(value) for name, value in self.settings.items()},
+        }
+
     @property
     def shown(self) -> Layer:
         """The active layer."""
@@ -103,7 +130,7 @@ def read_state(content: Any) -> State:
     given = _sequence(state.get("layers"), "layers", MOST_LAYERS)
     if not given:
         raise StateError("layers", "no model is shown: choose one")
-    layers = tuple(_layer(layer, f"layers.{i}") for i, layer in enumerate(given))
+    layers = tuple(read_layer(layer, f"layers.{i}") for i, layer in enumerate(given))
     compare = state.get("compare")
     quantities = _sequence(state.get("quantities", ["intensity"]), "quantities", len(QUANTITIES))
     for quantity in quantities:
@@ -123,7 +150,8 @@ def read_state(content: Any) -> State:
     )
 
 
-def _layer(content: Any, place: str) -> Layer:
+def read_layer(content: Any, place: str) -> Layer:
+    """Check one layer; errors as :func:`read_state`."""
     layer = _mapping(content, place, "a model")
     name = layer.get("model")
     if not isinstance(name, str) or name not in MODELS:
