@@ -130,7 +130,7 @@ def read_state(content: Any) -> State:
     given = _sequence(state.get("layers"), "layers", MOST_LAYERS)
     if not given:
         raise StateError("layers", "no model is shown: choose one")
-    layers = tuple(read_layer(layer, f"layers.{i}") for i, layer in enumerate(given))
+    layers = tuple(_layer(layer, f"layers.{i}") for i, layer in enumerate(given))
     compare = state.get("compare")
     quantities = _sequence(state.get("quantities", ["intensity"]), "quantities", len(QUANTITIES))
     for quantity in quantities:
@@ -150,8 +150,7 @@ def read_state(content: Any) -> State:
     )
 
 
-def read_layer(content: Any, place: str) -> Layer:
-    """Check one layer; errors as :func:`read_state`."""
+def _layer(content: Any, place: str) -> Layer:
     layer = _mapping(content, place, "a model")
     name = layer.get("model")
     if not isinstance(name, str) or name not in MODELS:

@@ -43,8 +43,8 @@ class Application {
   }
 
   // Change the state: `change` edits a copy. While a slider is dragged pictures are drawn fast, and only the end of
-  // the drag is a step of undo.
-  change(change, { dragging = false } = {}) {
+  // the drag is a step of undo. `views` names those whose pictures change, all by default.
+  change(change, { dragging = false, views = null } = {}) {
     const before = this.state;
     const next = structuredClone(before);
     change(next);
@@ -52,7 +52,7 @@ class Application {
     this.state = next;
     if (!dragging) this.keep();
     this.tell("state", { dragging });
-    this.draw(dragging);
+    this.draw(dragging, views);
   }
 
   // Show another state altogether, a step of undo as well.
@@ -86,10 +86,15 @@ class Application {
   }
 
   // Ask for pictures: one request at a time, the latest wins.
-  draw(dragging = false) {
-    if (!this.state) return;
-    if (this.drawing) { this.wanted = { dragging }; return; }
-    const views = this.shownViews();
+  draw(dragging = false, only = null) {
+    if (!this.state || only?.length === 0) return;
+    if (this.drawing) {
+      // where all are wanted already, all stay wanted
+      const both = only && this.wanted?.only !== null ? [...new Set([...only, ...this.wanted?.only ?? []])] : null;
+      this.wanted = { dragging, only: both };
+      return;
+    }
+    const views = this.shownViews().filter(view => !only || only.includes(view));
     if (!views.length) return;
     this.drawing = true;
     this.wanted = null;
@@ -104,7 +109,7 @@ class Application {
     if (drawn || (content.type === "error" && content.about === "draw")) {
       this.drawing = false;
       this.tell("drawn", content);
-      if (this.wanted) this.draw(this.wanted.dragging);
+      if (this.wanted) this.draw(this.wanted.dragging, this.wanted.only);
     }
   }
 }

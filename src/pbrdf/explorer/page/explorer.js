@@ -78,9 +78,7 @@ function render({ model, el }) {
     if (app.state) app.tell("state", { dragging: false }); else show();
     app.draw();
   });
-  app.on("answer:read_state", content => {
-    if (content.layer) addLayer(app, content.layer); else app.replace(content.state);
-  });
+  app.on("answer:read_state", content => app.replace(content.state));
   app.on("answer:error", content => {
     // a state that was refused before anything was shown leaves the empty page
     if (content.about === "read_state") { app.tell("note", content.text); if (!app.state) show(); return; }
@@ -179,7 +177,7 @@ function sayFaults(side, faults) {
     const fault = node.querySelector(":scope > .fault.said");
     if (fault) fault.remove();
     node.classList.remove("faulty");
-    node.querySelectorAll("[aria-invalid=true]").forEach(input => input.removeAttribute("aria-invalid"));
+    node.querySelectorAll(".refused").forEach(input => { input.classList.remove("refused"); input.removeAttribute("aria-invalid"); });
   }
   const unsaid = [];
   for (const [place, text] of faults) {
@@ -188,7 +186,7 @@ function sayFaults(side, faults) {
     if (!node) { unsaid.push(text); continue; }
     node.classList.add("faulty");
     node.append(element("p", { class: "fault said", role: "alert" }, text));
-    node.querySelectorAll("input, select").forEach(input => input.setAttribute("aria-invalid", "true"));
+    node.querySelectorAll("input, select").forEach(input => { input.classList.add("refused"); input.setAttribute("aria-invalid", "true"); });
   }
   return unsaid;
 }

@@ -1,7 +1,7 @@
-// Files that the reader drops or chooses: saved states and models; everything else is the data panel's.
+// Files that the reader drops or chooses: saved states, and what pbrdf opens, models, data, fits and maps.
 
-// A state or a model is a few kilobytes.
-const MOST_JSON = 1 << 20;
+// Bytes at most, of a state and of what the server takes.
+const MOST_STATE = 1 << 20, MOST_BYTES = 48 << 20;
 
 function openFiles(app, el) {
   const input = element("input", { type: "file", multiple: true, class: "unseen", tabindex: -1, "aria-hidden": "true", onchange: async () => {
@@ -12,13 +12,21 @@ function openFiles(app, el) {
 
   async function take(files) {
     for (const file of files) {
-      const content = file.name.toLowerCase().endsWith(".json") && file.size <= MOST_JSON ? await jsonOf(file) : null;
-      if (content?.layers) app.send({ type: "read_state", state: content, from: file.name });
-      else if (content?.model && content?.parameters) app.send({ type: "read_state", from: file.name, model: { ...content, name: file.name.replace(/\.json$/i, "") } });
-      else if (app.listeners.has("file")) app.tell("file", file);
-      else app.tell("note", `${file.name}: this is neither a model nor a saved state.`);
+      const state = await stateIn(file);
+      if (state) app.send({ type: "read_state", state, from: file.name });
+      else if (file.size > MOST_BYTES) app.tell("note", `${file.name}: ${Math.round(file.size / 1e6)} MB are more than the page takes; open it with pbrdf explore ${file.name}`);
+      else {
+        app.tell("note", `Opening ${file.name} …`, true);
+        app.send({ type: "open", name: file.name }, [await file.arrayBuffer()]);
+      }
     }
   }
+  app.on("answer:opened", ({ name, layers, datasets, maps }) => {
+    app.tell("note", `${name} is open.`);
+    for (const layer of layers) addLayer(app, layer);
+    // data want a model beside them
+    if (!app.state && datasets.length + maps.length) addLayer(app, defaultLayer(app, Object.keys(app.catalogue.models)[0]));
+  });
 
   // Files are taken wherever on the explorer they fall.
   const holds = event => event.dataTransfer?.types.includes("Files");
@@ -33,6 +41,11 @@ function openFiles(app, el) {
   return { choose: () => input.click(), take };
 }
 
-async function jsonOf(file) {
-  try { return JSON.parse(await file.text()); } catch { return null; }
+// The state that a file holds, null where it holds something else.
+async function stateIn(file) {
+  if (!file.name.toLowerCase().endsWith(".json") || file.size > MOST_STATE) return null;
+  try {
+    const content = JSON.parse(await file.text());
+    return content && Array.isArray(content.layers) ? content : null;
+  } catch { return null; }
 }

@@ -1,19 +1,33 @@
 // The parameters and options of the active model.
 
-// What a layer began with: a paint's parameters, or the model's defaults.
-function beginningOf(app, layer) {
-  const paint = app.catalogue.paints.find(p => p.name === layer.name && p.model === layer.model);
-  return paint?.parameters ?? Object.fromEntries(app.catalogue.models[layer.model].parameters.map(p => [p.name, p.default]));
+// What layers began with, to go back to: paints are known, others began with what they had when they came. A layer that
+// is renamed keeps its beginning.
+class Beginnings {
+  constructor(paints) {
+    this.of = new Map(paints.map(paint => [this.key(paint), paint.parameters]));
+    this.keys = [];
+  }
+  key(layer) { return `${layer.model} ${layer.name}`; }
+  update(layers) {
+    const keys = layers.map(this.key);
+    keys.forEach((key, i) => {
+      const renamed = keys.length === this.keys.length && this.keys[i].startsWith(`${layers[i].model} `);
+      if (!this.of.has(key)) this.of.set(key, renamed ? this.of.get(this.keys[i]) : { ...layers[i].parameters });
+    });
+    this.keys = keys;
+  }
 }
 
 PANELS.push({
   name: "parameters",
   title: "Parameters",
   build(place, app) {
+    const beginnings = new Beginnings(app.catalogue.paints);
+    const begunOf = layer => beginnings.of.get(beginnings.key(layer));
     const about = element("p", { class: "about" }), sliders = element("div", {}), choices = element("div", { class: "options" });
     const reset = element("button", { type: "button", onclick: () => app.change(state => {
       const layer = state.layers[state.active];
-      layer.parameters = { ...beginningOf(app, layer) };
+      layer.parameters = { ...begunOf(layer) };
     }) }, "Reset all");
     place.append(about, sliders, choices, element("div", { class: "buttons" }, reset));
     const rows = new Map(), selects = new Map();
@@ -25,7 +39,7 @@ PANELS.push({
       selects.clear();
       for (const p of parameters) {
         const set = (value, dragging) => app.change(state => { state.layers[state.active].parameters[p.name] = value; }, { dragging });
-        rows.set(p.name, sliderRow(p, set, () => beginningOf(app, app.state.layers[app.state.active])[p.name]));
+        rows.set(p.name, sliderRow(p, set, () => begunOf(app.state.layers[app.state.active])[p.name]));
       }
       // the explorer draws fast while a slider moves and as by default at rest, whatever a model's accuracy is
       for (const [name, option] of Object.entries(options)) if (name !== "accuracy") {
@@ -40,7 +54,8 @@ PANELS.push({
       update(state) {
         const layer = state.layers[state.active], path = `layers.${state.active}`;
         if (shown !== layer.model) { rebuild(layer); shown = layer.model; }
-        const begun = beginningOf(app, layer);
+        beginnings.update(state.layers);
+        const begun = begunOf(layer);
         let moved = false;
         for (const [name, row] of rows) {
           row.node.dataset.place = `${path}.parameters.${name}`;
