@@ -19,7 +19,8 @@ READ = """([selector, places]) => {
     const pixels = new Uint8Array(4 * canvas.width * canvas.height);
     gl.readPixels(0, 0, canvas.width, canvas.height, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
     return places.map(([x, y]) => {
-        const column = Math.round((x + 1) * canvas.width / 2 - 0.5), row = Math.round((y + 1) * canvas.height / 2 - 0.5);
+        const column = Math.round((x + 1) * canvas.width / 2 - 0.5);
+        const row = Math.round((y + 1) * canvas.height / 2 - 0.5);
         const at = 4 * (row * canvas.width + column);
         return [...pixels.subarray(at, at + 4)];
     });

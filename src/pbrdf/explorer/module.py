@@ -19,10 +19,17 @@ PARTS = (
     "graphics.js",
     "legend.js",
     "application.js",
+    "address.js",
+    "controls.js",
+    "files.js",
     "views/hemisphere.js",
     "views/sphere.js",
     "views/polar.js",
-    "controls.js",
+    "panels/models.js",
+    "panels/parameters.js",
+    "panels/light.js",
+    "panels/quantities.js",
+    "empty.js",
     "explorer.js",
 )
 

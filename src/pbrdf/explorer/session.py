@@ -28,7 +28,7 @@ VIEWS = {
 }
 #: Modules that answer the other requests, by the request's type; each has
 #: ``answer(request, buffers, workspace, emit)``.
-REQUESTS: dict[str, str] = {}
+REQUESTS: dict[str, str] = {"read_state": "pbrdf.explorer.reading"}
 #: Requests that wait, at most; a page waits for answers, so more come from no page of ours.
 _MOST_WAITING = 64
 
