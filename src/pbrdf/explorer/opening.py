@@ -21,7 +21,12 @@ __all__ = ["is_map", "open_source"]
 _OF_MAPS = {"estimate", "standard_error", "status"}
 
 
-def open_source(workspace: Workspace, source: str, read: Callable[[str], xr.Dataset] = read) -> None:
+def open_source(
+    workspace: Workspace,
+    source: str,
+    read: Callable[[str], xr.Dataset] = read,
+    name: str | None = None,
+) -> None:
     """Open what a name or a path stands for.
 
     Parameters
@@ -32,6 +37,8 @@ def open_source(workspace: Workspace, source: str, read: Callable[[str], xr.Data
         Name of a bundled paint, a model's JSON file, the folder of a fit, a map, or a file of data.
     read
         Reads data.
+    name
+        What it is called; None for the name of the file.
 
     Raises
     ------
@@ -41,11 +48,11 @@ def open_source(workspace: Workspace, source: str, read: Callable[[str], xr.Data
     path = Path(source)
     if not path.exists():
         if source in PAINTS:
-            workspace.add_model(source, load_paint(source))
+            workspace.add_model(name or source, load_paint(source))
             return
         names = "" if path.suffix else f", and no paint of that name: {', '.join(PAINTS)}"
         raise PbrdfError(f"{source}: there is no such file{names}")
-    name = path.resolve().name
+    name = name or path.resolve().name
     if _is_fit(path):
         from pbrdf.inversion.stored_result import load_fit
 
@@ -53,7 +60,7 @@ def open_source(workspace: Workspace, source: str, read: Callable[[str], xr.Data
     elif (path / "model.json").is_file():
         workspace.add_model(name, load_model(path / "model.json"))
     elif path.suffix.lower() == ".json":
-        workspace.add_model(path.stem, load_model(path))
+        workspace.add_model(name.removesuffix(".json"), load_model(path))
     elif (found := _map(path)) is not None:
         workspace.maps.append((name, found))
     else:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pbrdf.data.select import measured_channels
 from pbrdf.errors import PbrdfError
 from pbrdf.explorer.catalogue import layer_of, state_of
 from pbrdf.explorer.state import MOST_LAYERS
@@ -81,8 +82,10 @@ class Workspace:
         Raises
         ------
         PbrdfError
-            If too many are open.
+            If nothing is measured in them, or too many are open.
         """
+        if not measured_channels(dataset):
+            raise PbrdfError(f"{name}: there is no measured value in it")
         if len(self.datasets) >= MOST_OPEN:
             raise PbrdfError(
                 f"{name}: {MOST_OPEN} data sets are open, more cannot be: start the explorer again"
