@@ -72,9 +72,9 @@ class SocketModel {
   }
 }
 
-const token = new URLSearchParams(location.search).get("token") ?? "";
-const scheme = location.protocol === "https:" ? "wss" : "ws";
-const model = new SocketModel(`${scheme}://${location.host}/socket?token=${encodeURIComponent(token)}`);
+// the token stands in a cookie now: out of the address, which may be shown and sent
+if (new URLSearchParams(location.search).has("token")) history.replaceState(null, "", location.pathname + location.hash);
+const model = new SocketModel(`ws://${location.host}/socket`);
 // the state of the page stands in the address: a reload, or a colleague with the same data, sees the same
 model.set("address", true);
 explorer.render({ model, el: document.getElementById("explorer") });

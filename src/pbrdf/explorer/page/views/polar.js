@@ -314,7 +314,6 @@ VIEWS.push({
     app.on("theme", redraw);
     return {
       show(content, buffers) {
-        if (content.error) return;
         header = content;
         fields = buffers;
         values = null;

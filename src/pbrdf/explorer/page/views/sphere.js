@@ -235,7 +235,6 @@ VIEWS.push({
     app.on("state", update);
     return {
       show(content, buffers) {
-        if (content.error) return;
         header = content;
         fields = buffers.slice(0, -1);
         const last = buffers.at(-1);
