@@ -3,13 +3,10 @@
 class ColourLegend {
   constructor() {
     this.bar = element("canvas", { width: 256, height: 1, "aria-hidden": "true" });
-    Object.assign(this.bar.style, { width: "100%", height: "10px", display: "block" });
     this.least = element("span", {});
     this.about = element("span", {});
     this.most = element("span", {});
-    const words = element("div", {}, this.least, this.about, this.most);
-    Object.assign(words.style, { display: "flex", justifyContent: "space-between", gap: "1em" });
-    this.node = element("div", { class: "view-legend" }, this.bar, words);
+    this.node = element("div", { class: "colour-legend" }, this.bar, element("div", {}, this.least, this.about, this.most));
   }
 
   // `table` has 256 colours, or is null where the picture is grey; `ends` are the numbers at both ends.

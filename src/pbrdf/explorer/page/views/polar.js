@@ -67,8 +67,7 @@ void main() {
 
 const QUANTITY_TITLES = { intensity: "Intensity", dolp: "DoLP", aolp: "AoLP", q: "Q/I", u: "U/I", v: "V/I" };
 const quantityTitle = name => QUANTITY_TITLES[name] ?? `M${name[1]}${name[2]}`;
-// Okabe and Ito's colours, one for each model, told apart by the colour-blind on light and dark ground.
-const NET_COLOURS = [[0.84, 0.37, 0], [0, 0.62, 0.45], [0.8, 0.47, 0.65], [0.34, 0.71, 0.91], [0.9, 0.62, 0], [0.5, 0.5, 0.5]];
+const rgbOf = hex => [1, 3, 5].map(at => parseInt(hex.slice(at, at + 2), 16) / 255);
 
 VIEWS.push({
   name: "polar",
@@ -77,10 +76,9 @@ VIEWS.push({
     const label = "Polar surface; the arrow keys turn it, Home turns it back";
     const canvas = element("canvas", { width: 600, height: 450, tabindex: 0, role: "application", "aria-label": label, "aria-roledescription": "turnable picture" });
     const words = element("canvas", { width: 600, height: 450, "aria-hidden": "true" });
-    const frame = element("div", {}, canvas, words);
-    frame.style.position = "relative";
-    Object.assign(canvas.style, { width: "100%", aspectRatio: "4 / 3", touchAction: "none", cursor: "grab", display: "block" });
-    Object.assign(words.style, { position: "absolute", left: 0, top: 0, width: "100%", height: "100%", pointerEvents: "none" });
+    const frame = element("div", { class: "turnable" }, canvas, words);
+    // the first to ask decides: lines and edges want smoothing, which fields do not
+    canvas.getContext("webgl2", { antialias: true, preserveDrawingBuffer: true });
     const graphics = new Graphics(canvas, SURFACE, SURFACE_VERTEX), gl = graphics.gl;
     const tables = Object.fromEntries(Object.entries(app.catalogue.colours).map(([name, text]) => [name, decoded(text)]));
     let header = null, fields = [], surface = null, net = null, meshed = "", values = null;
@@ -89,18 +87,16 @@ VIEWS.push({
     const set = (values, { dragging = false, views = [] } = {}) => app.change(state => {
       state.settings.polar = { ...state.settings.polar, ...values };
     }, { dragging, views });
-    const chooser = (name, title, choices) => {
-      const id = freshId(`polar-${name}`);
-      const select = element("select", { id, name: `polar-${name}`, onchange: event => set({ [name]: event.target.value }, { views: ["polar"] }) },
-        choices.map(([value, text]) => element("option", { value }, text)));
-      return { select, row: element("div", { class: "view-setting" }, element("label", { for: id }, title), select) };
-    };
-    const quantity = chooser("quantity", "Distance", app.catalogue.quantities.map(name => [name, quantityTitle(name)]));
-    const scale = chooser("scale", "Scale", [["linear", "linear"], ["logarithmic", "logarithmic"]]);
+    const named = names => names.map(name => [name, quantityTitle(name)]), known = app.catalogue.quantities;
+    const quantity = selectField("Distance from the origin", [[null, named(known.filter(name => name in QUANTITY_TITLES))], ["Mueller elements", named(known.filter(name => !(name in QUANTITY_TITLES)))]],
+      value => set({ quantity: value }, { views: ["polar"] }), { name: "polar-quantity" });
+    const scale = choiceRow("Scale", [{ value: "linear", text: "linear" }, { value: "logarithmic", text: "log", title: "logarithmic" }], value => set({ scale: value }, { views: ["polar"] }));
+    quantity.node.dataset.place = "settings.polar.quantity";
+    scale.node.dataset.place = "settings.polar.scale";
     const legend = new ColourLegend();
-    const models = element("p", { class: "view-note" });
-    const readout = element("p", { class: "view-readout" }, "\u00a0");
-    place.append(quantity.row, scale.row, frame, legend.node, readout, models);
+    const models = element("p", { class: "models" });
+    const readout = element("p", { class: "read" }, "\u00a0");
+    place.append(element("div", { class: "above" }, quantity.node, scale.node), frame, legend.node, readout, models);
 
     // Indices of the triangles, and of the lines of a coarse net.
     function mesh(rows, columns) {
@@ -127,7 +123,7 @@ VIEWS.push({
 
     // The plane below with its azimuths, the light and its mirror direction: lists of points, width, colour.
     function scenery(theta) {
-      const dark = getComputedStyle(canvas).colorScheme.includes("dark") || app.theme === "dark";
+      const dark = app.theme === "dark";
       const ground = dark ? [0.4, 0.4, 0.42, 1] : [0.72, 0.72, 0.74, 1], red = dark ? [1, 0.5, 0.35, 1] : [0.75, 0.2, 0, 1];
       const circle = radius => Array.from({ length: 73 }, (_, i) => [radius * Math.cos(i * Math.PI / 36), radius * Math.sin(i * Math.PI / 36), 0]);
       const source = [-Math.sin(theta), 0, Math.cos(theta)], mirror = [Math.sin(theta), 0, Math.cos(theta)];
@@ -202,7 +198,7 @@ VIEWS.push({
       fields.forEach((field, i) => {
         graphics.field("field", field, rows, some);
         graphics.integer("kind", i ? 1 : 0);
-        if (i) graphics.vector("ink", [...NET_COLOURS[(i - 1) % NET_COLOURS.length], 1]);
+        if (i) graphics.vector("ink", [...rgbOf(app.catalogue.looks[header.layers[i]].colour), 1]);
         const { buffer, count } = i ? net : surface;
         gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, buffer);
         gl.drawElements(i ? gl.LINES : gl.TRIANGLES, count, gl.UNSIGNED_INT, 0);
@@ -238,19 +234,16 @@ VIEWS.push({
       const low = header.scale === "logarithmic" && !signed && header.quantity !== "aolp" ? most * 10 ** -header.decades : signed ? -most : 0;
       const name = quantityTitle(header.quantity);
       legend.show(tables[header.colours], [low, most], unit, header.scale === "logarithmic" ? `${name}, ${header.decades} decades` : name);
-      const [first, ...others] = header.layers.map(i => app.state.layers[i]?.name ?? "");
-      models.replaceChildren(`Surface: ${first}`, ...others.flatMap((name, i) => {
-        const line = element("span", { "aria-hidden": "true" }, "▦");
-        line.style.color = `rgb(${NET_COLOURS[i % NET_COLOURS.length].map(c => Math.round(255 * c)).join(" ")})`;
-        return [" ", line, ` net: ${name}`];
-      }));
+      models.replaceChildren(...header.layers.flatMap((layer, i) => [
+        i ? swatch({ ...app.catalogue.looks[layer], dash: [] }) : "", `${i ? " net" : "surface"}: ${app.state.layers[layer]?.name ?? ""} `,
+      ]));
     }
 
     function update() {
       const chosen = settings();
       quantity.select.value = chosen.quantity;
-      scale.select.value = chosen.scale;
-      scale.row.hidden = chosen.quantity === "aolp";
+      scale.show(chosen.scale);
+      scale.node.classList.toggle("idle", chosen.quantity === "aolp");
       redraw();
     }
 

@@ -7,12 +7,14 @@ in vec2 at;
 uniform sampler2D field, other, table;
 uniform vec4 analyser;
 uniform vec3 lamp;
-uniform vec2 range, handle;
+uniform vec2 range, handle, axis;
 uniform float azimuth, rim, gain, pixel;
 uniform int mode;
 uniform bool difference, handled;
 out vec4 colour;
 const float PI = 3.14159265, MARGIN = 1.02;
+// the polariser's disc stands in the lower right corner
+const vec3 DISC = vec3(0.85, -0.85, 0.15);
 
 // radiance and its shares Q, U, V at a place of the ball
 vec4 seen(sampler2D values, float zenith, float turn) {
@@ -61,15 +63,24 @@ void main() {
     picture = mix(vec3(ring < 1.2 ? 0.0 : 1.0), picture, smoothstep(2.0, 3.0, ring));
   }
   colour = vec4(picture * cover, cover);
+  vec2 p = w - DISC.xy;
+  if (mode == 1 && length(p) < DISC.z + pixel) {
+    float rim = 1.0 - clamp((DISC.z - 2.0 * pixel - length(p)) / pixel, 0.0, 1.0), edge = clamp((DISC.z - length(p)) / pixel, 0.0, 1.0);
+    // stripes along the axis that passes
+    float stripe = smoothstep(0.25, 0.4, abs(fract(dot(p, vec2(-axis.y, axis.x)) * 20.0 + 0.5) - 0.5));
+    colour = vec4(vec3(0.5), 1.0) * max(rim, 0.75 * stripe) * edge;
+  }
 }`;
 
-// What each mode of the picture shows: colours, whether its range comes with the picture, units.
+const DISC = { x: 0.85, y: -0.85, radius: 0.15 };
+
+// What the modes of the picture are called, and the units of their numbers.
 const BALL_MODES = {
-  radiance: { title: "Radiance", unit: "sr⁻¹", scale: 1 },
-  polariser: { title: "Behind a polariser", unit: "sr⁻¹", scale: 1 },
-  dolp: { title: "Degree of linear polarisation", unit: "%", scale: 100 },
-  aolp: { title: "Angle of linear polarisation", unit: "°", scale: 180 / Math.PI },
-  circular: { title: "Circular part V/I", unit: "%", scale: 100 },
+  radiance: { text: "Radiance", title: "radiance", unit: "sr⁻¹", scale: 1 },
+  polariser: { text: "Polariser", title: "radiance behind a polariser", unit: "sr⁻¹", scale: 1 },
+  dolp: { text: "DoLP", title: "degree of linear polarisation", unit: "%", scale: 100 },
+  aolp: { text: "AoLP", title: "angle of linear polarisation", unit: "°", scale: 180 / Math.PI },
+  circular: { text: "V/I", title: "circular polarisation", unit: "%", scale: 100 },
 };
 
 // The number that 16 bits of a float16 stand for.
@@ -91,8 +102,7 @@ VIEWS.push({
   name: "sphere",
   title: "Lit ball",
   build(place, app) {
-    const canvas = element("canvas", { width: 450, height: 450, role: "img", "aria-label": "A lit ball as a polarisation camera sees it" });
-    Object.assign(canvas.style, { width: "100%", aspectRatio: "1", touchAction: "none", cursor: "move", display: "block" });
+    const canvas = element("canvas", { width: 450, height: 450, class: "ball", role: "img", "aria-label": "A lit ball as a polarisation camera sees it" });
     const graphics = new Graphics(canvas, BALL);
     graphics.gl.enable(graphics.gl.BLEND);
     graphics.gl.blendFunc(graphics.gl.ONE, graphics.gl.ZERO);
@@ -111,26 +121,22 @@ VIEWS.push({
     const show = (name, value, dragging = false) => set({ [name]: value }, dragging, []);
     const light = (values, dragging) => set({ light: { ...lamp(), ...values } }, dragging, ["sphere"]);
 
-    const slider = (name, title, min, max, step, change) => {
-      const id = freshId(`sphere-${name}`), input = element("input", { type: "range", id, name: `sphere-${name}`, min, max, step,
-        oninput: event => change(Number(event.target.value), true), onchange: event => change(Number(event.target.value), false) });
-      const output = element("output", { for: id });
-      const row = element("div", { class: "view-setting" }, element("label", { for: id }, title), input, output);
-      return { row, input, output };
+    const slider = (name, symbol, about, unit, lower, upper, set) => {
+      const row = sliderRow({ name: `sphere-${name}`, symbol, about, unit, lower, upper, least: lower, most: upper }, set);
+      row.node.dataset.place = `settings.sphere.${name}`;
+      return row;
     };
-    const modeId = freshId("sphere-mode");
-    const mode = element("select", { id: modeId, name: "sphere-mode", onchange: event => show("mode", event.target.value) },
-      Object.entries(BALL_MODES).map(([name, { title }]) => element("option", { value: name }, title)));
-    const dial = slider("polariser", "Polariser", 0, 180, 0.5, (value, dragging) => show("polariser", value, dragging));
-    const exposure = slider("exposure", "Exposure", -8, 8, 0.25, (value, dragging) => show("exposure", value, dragging));
-    const polar = slider("polar", "Lamp from camera", 0, 180, 1, (value, dragging) => light({ polar: value }, dragging));
-    const azimuth = slider("azimuth", "Lamp around", 0, 360, 1, (value, dragging) => light({ azimuth: value }, dragging));
+    const mode = choiceRow("What the ball shows", Object.entries(BALL_MODES).map(([value, { text, title }]) => ({ value, text, title })), value => show("mode", value));
+    const dial = slider("polariser", "α", "polariser, from level", "°", 0, 180, (value, dragging) => show("polariser", value, dragging));
+    const exposure = slider("exposure", "EV", "exposure", "stops", -8, 8, (value, dragging) => show("exposure", value, dragging));
+    const polar = slider("light.polar", "θ", "lamp, from the camera", "°", 0, 180, (value, dragging) => light({ polar: value }, dragging));
+    const azimuth = slider("light.azimuth", "ψ", "lamp, around the ball from the right", "°", 0, 360, (value, dragging) => light({ azimuth: value }, dragging));
     const legend = new ColourLegend();
-    const readout = element("p", { class: "view-readout" });
-    const about = element("p", { class: "view-note" }, "Drag on the ball to move the lamp. Angles of polarisation and polariser count from level, counterclockwise.");
+    const readout = element("p", { class: "read" });
     place.append(
-      element("div", { class: "view-setting" }, element("label", { for: modeId }, "Shows"), mode),
-      canvas, legend.node, readout, dial.row, exposure.row, polar.row, azimuth.row, about,
+      mode.node, canvas, legend.node, readout, dial.node, exposure.node,
+      element("details", { class: "elements" }, element("summary", {}, "Lamp: drag on the ball, or here"), polar.node, azimuth.node,
+        element("p", { class: "about" }, "Angles of polarisation are those of the picture: 0° is level, counterclockwise. Of polarised light p lies in the plane of lamp and camera.")),
     );
 
     function range() {
@@ -155,6 +161,7 @@ VIEWS.push({
       graphics.integer("handled", handled ? 1 : 0);
       graphics.vector("range", range());
       graphics.vector("lamp", header.towards_lamp);
+      graphics.vector("axis", [Math.cos(chosen.polariser * Math.PI / 180), Math.sin(chosen.polariser * Math.PI / 180)]);
       graphics.number("rim", header.rim);
       graphics.number("gain", Math.PI * 2 ** chosen.exposure);
       graphics.number("azimuth", header.lamp[1] * Math.PI / 180);
@@ -164,7 +171,7 @@ VIEWS.push({
       gl.drawArrays(gl.TRIANGLES, 0, 3);
       const tone = !both && index < 2;
       legend.show(tone ? null : tables[wanted], range().map(v => v * known.scale), known.unit,
-        both ? `${header.models[0]} − ${header.models[1]}` : known.title);
+        both ? `${known.text}: ${header.models[0]} − ${header.models[1]}` : tone ? `${known.title}, the brighter the more` : known.title);
     }
 
     // where the ball mirrors the lamp, from its middle in radii
@@ -175,13 +182,10 @@ VIEWS.push({
 
     function update() {
       const chosen = settings(), { polar: p, azimuth: a } = lamp();
-      mode.value = chosen.mode;
-      dial.row.hidden = chosen.mode !== "polariser";
-      exposure.row.hidden = fields.length > 1 || !["radiance", "polariser"].includes(chosen.mode);
-      for (const [{ input, output }, value, text] of [
-        [dial, chosen.polariser, `${written(chosen.polariser, 4)}°`], [exposure, chosen.exposure, `${written(chosen.exposure)} stops`],
-        [polar, p, `${Math.round(p)}°`], [azimuth, a, `${Math.round(a)}°`],
-      ]) { input.value = value; output.value = text; input.setAttribute("aria-valuetext", text); }
+      mode.show(chosen.mode);
+      dial.node.hidden = chosen.mode !== "polariser";
+      exposure.node.hidden = fields.length > 1 || !["radiance", "polariser"].includes(chosen.mode);
+      for (const [row, value] of [[dial, chosen.polariser], [exposure, chosen.exposure], [polar, p], [azimuth, a]]) row.show(value);
       redraw();
     }
 
@@ -204,9 +208,15 @@ VIEWS.push({
       }).join("; ");
     }
 
+    const onDisc = ([x, y]) => settings().mode === "polariser" && Math.hypot(x - DISC.x, y - DISC.y) < DISC.radius;
+    const turn = ([x, y], dragging) => {
+      const angle = Math.atan2(y - DISC.y, x - DISC.x) * 180 / Math.PI;
+      show("polariser", Number(((angle + 360) % 180).toFixed(1)), dragging);
+    };
     let grip = null;
     const drop = event => {
-      if (grip?.moved) light({}, false);
+      if (grip?.disc) show("polariser", settings().polariser);
+      else if (grip?.moved) light({}, false);
       grip = null;
       handled = event.type !== "pointerleave" && event.pointerType === "mouse";
       redraw();
@@ -214,10 +224,12 @@ VIEWS.push({
     canvas.addEventListener("pointerdown", event => {
       if (event.button) return;
       canvas.setPointerCapture(event.pointerId);
-      grip = { x: event.clientX, y: event.clientY, moved: false };
+      grip = { x: event.clientX, y: event.clientY, moved: false, disc: onDisc(pointed(event)) };
+      if (grip.disc) turn(pointed(event), true);
     });
     canvas.addEventListener("pointermove", event => {
       read(event);
+      if (grip?.disc) { turn(pointed(event), true); return; }
       if (!handled) { handled = true; redraw(); }
       if (!grip) return;
       // a click that trembles moves nothing
