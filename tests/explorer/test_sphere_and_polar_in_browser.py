@@ -150,6 +150,11 @@ def test_the_polar_surface(opened):
     page.mouse.move(box["x"] + box["width"] / 2 + 60, box["y"] + box["height"] / 2 + 30, steps=3)
     page.mouse.up()
     assert (picture() != first).any()
+    page.get_by_role("group", name="Scale").get_by_label("log").check()
+    surface = page.locator("article[aria-label='Polar surface']")
+    expect(surface.locator(".colour-legend")).to_contain_text("decades")
+    page.mouse.move(box["x"] + box["width"] * 0.55, box["y"] + box["height"] * 0.55)
+    expect(surface.locator(".read")).to_contain_text("Intensity")
     page.locator("select[name=polar-quantity]").select_option("dolp")
     expect(page.locator("article[aria-label='Polar surface'] .colour-legend")).to_contain_text("DoLP")
     assert len({tuple(pixel) for pixel in picture()}) > 20

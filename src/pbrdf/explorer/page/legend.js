@@ -9,12 +9,11 @@ class ColourLegend {
     this.node = element("div", { class: "colour-legend" }, this.bar, element("div", {}, this.least, this.about, this.most));
   }
 
-  // `table` has 256 colours, or is null where the picture is grey; `ends` are the numbers at both ends.
+  // `table` has 256 colours of four bytes, `ends` are the numbers at both ends.
   show(table, ends, unit, about) {
-    this.bar.style.visibility = table ? "visible" : "hidden";
-    if (table && this.table !== table) this.bar.getContext("2d").putImageData(new ImageData(new Uint8ClampedArray(table), 256, 1), 0, 0);
-    this.table = table ?? this.table;
-    [this.least.textContent, this.most.textContent] = table ? ends.map(end => `${written(end)} ${unit}`) : ["\u00a0", "\u00a0"];
+    if (this.table !== table) this.bar.getContext("2d").putImageData(new ImageData(new Uint8ClampedArray(table), 256, 1), 0, 0);
+    this.table = table;
+    [this.least.textContent, this.most.textContent] = ends.map(end => `${written(end)} ${unit}`);
     this.about.textContent = about;
   }
 }

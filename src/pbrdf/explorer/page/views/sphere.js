@@ -48,9 +48,7 @@ void main() {
   vec4 s = seen(field, zenith, turn);
   float value = shown(s);
   vec3 picture;
-  // between the grid's points the shadow has its own edge
-  if (mode > 1 && dot(lamp, vec3(w, sqrt(max(1.0 - radius * radius, 0.0)))) <= 0.0) picture = vec3(0.25);
-  else if (difference) {
+  if (difference) {
     vec4 t = seen(other, zenith, turn);
     float step = value - shown(t);
     if (mode == 3) step -= PI * round(step / PI);
@@ -58,6 +56,9 @@ void main() {
   } else if (mode < 2) picture = toned(value);
   else if (mode == 3) picture = mix(vec3(0.5), coloured(value), smoothstep(0.0, 0.01, length(s.yz)));
   else picture = coloured(value);
+  // the shadow's edge lies between the grid's points
+  float cosine = dot(lamp, vec3(w, sqrt(max(1.0 - radius * radius, 0.0))));
+  if (mode > 1) picture = mix(vec3(0.25), picture, clamp(cosine / pixel, 0.0, 1.0));
   if (handled) {
     float ring = abs(length(w - handle) - 0.06) / pixel;
     picture = mix(vec3(ring < 1.2 ? 0.0 : 1.0), picture, smoothstep(2.0, 3.0, ring));
@@ -82,6 +83,14 @@ const BALL_MODES = {
   aolp: { text: "AoLP", title: "angle of linear polarisation", unit: "°", scale: 180 / Math.PI },
   circular: { text: "V/I", title: "circular polarisation", unit: "%", scale: 100 },
 };
+
+// Greys of the tone curve over radiances up to this many times that of which it makes 1 − 1/e.
+const TONES = 4;
+const greys = Uint8Array.from({ length: 1024 }, (_, i) => {
+  if (i % 4 === 3) return 255;
+  const x = 1 - Math.exp(-TONES * Math.floor(i / 4) / 255);
+  return Math.round(255 * (x <= 0.0031308 ? 12.92 * x : 1.055 * x ** (1 / 2.4) - 0.055));
+});
 
 // The number that 16 bits of a float16 stand for.
 function halfNumber(bits) {
@@ -150,6 +159,7 @@ VIEWS.push({
       if (!header) return;
       const chosen = settings(), both = fields.length > 1, known = BALL_MODES[chosen.mode];
       if (!known) return;
+      const gain = Math.PI * 2 ** chosen.exposure;
       const gl = graphics.gl, index = Object.keys(BALL_MODES).indexOf(chosen.mode);
       const wanted = both || chosen.mode === "circular" ? "signed" : chosen.mode === "aolp" ? "cyclic" : "sequential";
       if (table !== wanted) { graphics.colours("table", tables[wanted]); table = wanted; }
@@ -163,15 +173,14 @@ VIEWS.push({
       graphics.vector("lamp", header.towards_lamp);
       graphics.vector("axis", [Math.cos(chosen.polariser * Math.PI / 180), Math.sin(chosen.polariser * Math.PI / 180)]);
       graphics.number("rim", header.rim);
-      graphics.number("gain", Math.PI * 2 ** chosen.exposure);
+      graphics.number("gain", gain);
       graphics.number("azimuth", header.lamp[1] * Math.PI / 180);
       graphics.number("pixel", 2.04 / canvas.width);
       graphics.vector("handle", highlight());
       gl.viewport(0, 0, canvas.width, canvas.height);
       gl.drawArrays(gl.TRIANGLES, 0, 3);
-      const tone = !both && index < 2;
-      legend.show(tone ? null : tables[wanted], range().map(v => v * known.scale), known.unit,
-        both ? `${known.text}: ${header.models[0]} − ${header.models[1]}` : tone ? `${known.title}, the brighter the more` : known.title);
+      const tone = !both && index < 2, ends = tone ? [0, TONES / gain] : range().map(v => v * known.scale);
+      legend.show(tone ? greys : tables[wanted], ends, known.unit, both ? `${known.text}: ${header.models[0]} − ${header.models[1]}` : known.title);
     }
 
     // where the ball mirrors the lamp, from its middle in radii
@@ -249,6 +258,7 @@ VIEWS.push({
       show(content, buffers) {
         header = content;
         fields = buffers.slice(0, -1);
+        readout.classList.toggle("two", fields.length > 1);
         const last = buffers.at(-1);
         polarisers = new Float32Array(last.buffer.slice(last.byteOffset, last.byteOffset + last.byteLength));
         graphics.field("field", fields[0], ...header.shape);
