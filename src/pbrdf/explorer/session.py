@@ -24,7 +24,10 @@ Emit = Callable[[Mapping[str, Any], Sequence[bytes | memoryview]], None]
 VIEWS = {"hemisphere": "pbrdf.explorer.views.hemisphere"}
 #: Modules that answer the other requests, by the request's type; each has
 #: ``answer(request, buffers, workspace, emit)``.
-REQUESTS: dict[str, str] = {"read_state": "pbrdf.explorer.reading"}
+REQUESTS: dict[str, str] = {
+    "read_state": "pbrdf.explorer.reading",
+    "export": "pbrdf.explorer.exports",
+}
 #: Requests that wait, at most; a page waits for answers, so more come from no page of ours.
 _MOST_WAITING = 64
 
