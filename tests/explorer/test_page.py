@@ -168,7 +168,7 @@ def test_nothing_open_a_paint_and_a_state_file(opened, tmp_path, white):
 
 def test_exports(opened):
     page = opened("thick")
-    page.get_by_label("What").select_option("plane")
+    page.get_by_label("What", exact=True).select_option("plane")
     assert page.get_by_label("As", exact=True).is_disabled()
     with page.expect_download() as saved:
         page.get_by_role("button", name="Save", exact=True).click()
@@ -176,7 +176,7 @@ def test_exports(opened):
     assert "# simulated: true" in saved.value.path().read_text()
     command = page.locator(".command code").inner_text()
     assert command == "pbrdf simulate thick.json --theta-i 35 --plane --output thick-plane.csv"
-    page.get_by_label("What").select_option("curves")
+    page.get_by_label("What", exact=True).select_option("curves")
     page.get_by_label("As", exact=True).select_option("svg")
     with page.expect_download() as saved:
         page.get_by_role("button", name="Save", exact=True).click()
