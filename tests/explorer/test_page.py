@@ -166,6 +166,23 @@ def test_nothing_open_a_paint_and_a_state_file(opened, tmp_path, white):
     assert state_of_page(page)["layers"][0]["name"] == "pearl-white"
 
 
+def test_exports(opened):
+    page = opened("thick")
+    page.get_by_label("What", exact=True).select_option("plane")
+    assert page.get_by_label("As", exact=True).is_disabled()
+    with page.expect_download() as saved:
+        page.get_by_role("button", name="Save", exact=True).click()
+    assert saved.value.suggested_filename == "thick-plane.csv"
+    assert "# simulated: true" in saved.value.path().read_text()
+    command = page.locator(".command code").inner_text()
+    assert command == "pbrdf simulate thick.json --theta-i 35 --plane --output thick-plane.csv"
+    page.get_by_label("What", exact=True).select_option("curves")
+    page.get_by_label("As", exact=True).select_option("svg")
+    with page.expect_download() as saved:
+        page.get_by_role("button", name="Save", exact=True).click()
+    assert "<svg" in saved.value.path().read_text()[:400]
+
+
 def test_keyboard_alone(opened):
     page = opened("thick")
     seen = []
@@ -173,8 +190,8 @@ def test_keyboard_alone(opened):
         page.keyboard.press("Tab")
         seen.append(
             page.evaluate(
-                "() => { const e = document.activeElement; return e.getAttribute('aria-label') ?? e.labels?.[0]?.innerText "
-                "?? e.innerText; }"
+                "() => { const e = document.activeElement; "
+                "return e.getAttribute('aria-label') ?? e.labels?.[0]?.innerText ?? e.innerText; }"
             )
         )
         outline = page.evaluate(

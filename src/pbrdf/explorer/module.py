@@ -29,6 +29,7 @@ PARTS = (
     "panels/parameters.js",
     "panels/light.js",
     "panels/quantities.js",
+    "panels/export.js",
     "empty.js",
     "explorer.js",
 )

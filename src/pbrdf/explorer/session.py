@@ -32,6 +32,7 @@ VIEWS = {
 #: Modules that answer the other requests, by the request's type; each has
 #: ``answer(request, buffers, workspace, emit)``.
 REQUESTS: dict[str, str] = {
+    "export": "pbrdf.explorer.exports",
     "open": "pbrdf.explorer.uploads",
     "read_state": "pbrdf.explorer.reading",
 }

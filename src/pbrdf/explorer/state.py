@@ -23,7 +23,6 @@ __all__ = [
     "Light",
     "State",
     "StateError",
-    "read_layer",
     "read_state",
 ]
 

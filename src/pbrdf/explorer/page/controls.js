@@ -4,6 +4,9 @@
 // Steps along a slider.
 const STEPS = 1000;
 
+// k_s as it is printed.
+const subscripted = symbol => symbol.split("_").map((part, i) => i ? element("sub", {}, part) : part);
+
 // What an error says of a control, empty while there is none.
 function faultBelow(input) {
   const fault = element("p", { class: "fault", id: freshId("fault") });
@@ -56,7 +59,7 @@ function sliderRow(scale, set, home = () => null) {
   const back = iconButton("reset", `Reset ${scale.symbol}`, () => set(home(), false));
   const beyond = element("span", { class: "beyond" });
   const node = element("div", { class: "slider-row" },
-    element("div", { class: "named" }, element("span", { class: "symbol", "aria-hidden": "true" }, scale.symbol), about),
+    element("div", { class: "named" }, element("span", { class: "symbol", "aria-hidden": "true" }, subscripted(scale.symbol)), about),
     element("div", { class: "typed" }, typed, element("span", { class: "unit" }, unit)),
     element("div", { class: "track" }, element("span", { class: "bound" }, written(lower)), slider, element("span", { class: "bound" }, written(upper)), back),
     beyond, fault);
