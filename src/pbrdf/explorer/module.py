@@ -23,6 +23,7 @@ PARTS = (
     "controls.js",
     "files.js",
     "views/hemisphere.js",
+    "views/mueller.js",
     "views/sphere.js",
     "views/polar.js",
     "panels/models.js",

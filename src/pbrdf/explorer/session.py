@@ -26,6 +26,7 @@ Emit = Callable[[Mapping[str, Any], Sequence[bytes | memoryview]], None]
 #: Modules of the views by name; each has ``draw(state, workspace, dragging)`` that gives a header and buffers.
 VIEWS = {
     "hemisphere": "pbrdf.explorer.views.hemisphere",
+    "mueller": "pbrdf.explorer.views.mueller",
     "sphere": "pbrdf.explorer.views.sphere",
     "polar": "pbrdf.explorer.views.polar",
 }

@@ -51,7 +51,7 @@ def draw(state: State, workspace: Workspace, dragging: bool) -> tuple[dict[str, 
         _values(state.layers[i].model.with_accuracy(accuracy), state, quantity, theta_r, phi) for i in indices
     ]
     most = max(float(np.abs(v).max()) for v in values)
-    most = math.pi if quantity == "aolp" else most if most > 0.0 else 1.0
+    most = 0.5 * math.pi if quantity == "aolp" else most if most > 0.0 else 1.0
     header = {
         "shape": [rows, len(phi), 4],
         "halved": halved,
@@ -73,7 +73,7 @@ def _field(shares: np.ndarray, quantity: str, scale: str) -> np.ndarray:
     """Distance, colour and value of shares of the largest value."""
     size = np.abs(shares)
     if quantity == "aolp":
-        distance, colour = np.ones_like(shares), shares
+        distance, colour = np.ones_like(shares), 0.5 + 0.5 * shares
     else:
         distance = size
         if scale == "logarithmic":
@@ -83,7 +83,7 @@ def _field(shares: np.ndarray, quantity: str, scale: str) -> np.ndarray:
 
 
 def _values(model: Model, state: State, quantity: str, theta_r: np.ndarray, phi: np.ndarray) -> np.ndarray:
-    """The quantity in each direction; angles of polarisation within 0 … π."""
+    """The quantity in each direction; angles of polarisation within −π/2 … π/2."""
     theta_i = np.deg2rad(state.light.theta_i)
     if quantity[0] == "m":
         f = model.mueller(theta_i, theta_r, phi, part=state.part)
@@ -92,7 +92,7 @@ def _values(model: Model, state: State, quantity: str, theta_r: np.ndarray, phi:
     if quantity == "intensity":
         return np.asarray(S[..., 0])
     if quantity == "aolp":
-        return np.mod(aolp(S), np.pi)
+        return np.asarray(aolp(S))
     if quantity == "dolp":
         return np.nan_to_num(dolp(S))
     return S[..., "iquv".index(quantity)] / np.maximum(S[..., 0], 1e-30)

@@ -229,9 +229,9 @@ VIEWS.push({
     ];
 
     function tell() {
-      const signed = header.colours === "signed", most = header.quantity === "aolp" ? 180 : header.most;
-      const unit = header.quantity === "intensity" || header.quantity[0] === "m" ? "sr⁻¹" : header.quantity === "aolp" ? "°" : "";
-      const low = header.scale === "logarithmic" && !signed && header.quantity !== "aolp" ? most * 10 ** -header.decades : signed ? -most : 0;
+      const signed = header.colours === "signed", angle = header.quantity === "aolp", most = angle ? 90 : header.most;
+      const unit = header.quantity === "intensity" || header.quantity[0] === "m" ? "sr⁻¹" : angle ? "°" : "";
+      const low = header.scale === "logarithmic" && !signed && !angle ? most * 10 ** -header.decades : signed || angle ? -most : 0;
       const name = quantityTitle(header.quantity);
       legend.show(tables[header.colours], [low, most], unit, header.scale === "logarithmic" ? `${name}, ${header.decades} decades` : name);
       models.replaceChildren(...header.layers.flatMap((layer, i) => [
@@ -254,8 +254,7 @@ VIEWS.push({
       const x = (event.clientX - box.left) * ratio, y = (event.clientY - box.top) * ratio;
       const [rows, some] = header.shape, columns = header.halved ? 2 * some - 1 : some;
       if (!values) {
-        const halves = Uint16Array.from({ length: rows * some * 4 }, (_, i) => fields[0].getUint16(2 * i, true));
-        values = Float32Array.from(halves, halfNumber);
+        values = Float32Array.from({ length: rows * some * 4 }, (_, i) => halfNumber(fields[0].getUint16(2 * i, true)));
       }
       const eye = axes(), { zoom, middle } = projection(), reach = 6 * ratio;
       let best = null;
@@ -269,8 +268,8 @@ VIEWS.push({
       }
       if (!best) { readout.textContent = "\u00a0"; return; }
       const odd = best.beyond && header.mirrored, angle = header.quantity === "aolp";
-      const share = odd ? (angle ? (1 - best.share) % 1 : -best.share) : best.share, azimuth = best.turn > Math.PI ? best.turn - 2 * Math.PI : best.turn;
-      const value = angle ? `${(180 * share).toFixed(1)}°` : written(share * header.most);
+      const share = odd ? -best.share : best.share, azimuth = best.turn > Math.PI ? best.turn - 2 * Math.PI : best.turn;
+      const value = angle ? `${written(Number((90 * share).toFixed(1)))}°` : written(share * header.most);
       const degrees = a => `${Math.round(a * 180 / Math.PI)}°`.replace("-", "−");
       readout.textContent = `θr ${degrees(best.zenith)}, φ ${degrees(azimuth)}: ${quantityTitle(header.quantity)} ${value}`;
     }

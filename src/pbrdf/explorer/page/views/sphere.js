@@ -27,7 +27,7 @@ float shown(vec4 s) {
   if (mode == 0) return s.x;
   if (mode == 1) return s.x * dot(analyser, vec4(1.0, s.yzw));
   if (mode == 2) return length(s.yz);
-  if (mode == 3) return mod(0.5 * atan(s.z, s.y), PI);
+  if (mode == 3) return 0.5 * atan(s.z, s.y);
   return s.w;
 }
 
@@ -92,12 +92,6 @@ const greys = Uint8Array.from({ length: 1024 }, (_, i) => {
   return Math.round(255 * (x <= 0.0031308 ? 12.92 * x : 1.055 * x ** (1 / 2.4) - 0.055));
 });
 
-// The number that 16 bits of a float16 stand for.
-function halfNumber(bits) {
-  const exponent = bits >> 10 & 31, fraction = bits & 1023, sign = bits >> 15 ? -1 : 1;
-  return sign * (exponent ? 2 ** (exponent - 15) * (1 + fraction / 1024) : 2 ** -14 * fraction / 1024);
-}
-
 // Four channels of a float16 field between its grid points, as the graphics card interpolates.
 function between(view, [rows, columns], row, column) {
   const y = Math.min(Math.max(row, 0), rows - 1), x = Math.min(Math.max(column, 0), columns - 1);
@@ -150,7 +144,7 @@ VIEWS.push({
 
     function range() {
       const { mode } = settings(), both = fields.length > 1;
-      if (mode === "aolp") return both ? [-Math.PI / 2, Math.PI / 2] : [0, Math.PI];
+      if (mode === "aolp") return [-Math.PI / 2, Math.PI / 2];
       const most = header.ranges[mode === "polariser" ? "radiance" : mode];
       return both || mode === "circular" ? [-most, most] : [0, most];
     }
@@ -210,10 +204,10 @@ VIEWS.push({
       const [rows, columns] = header.shape;
       readout.textContent = fields.map((field, i) => {
         const [L, q, u, v] = between(field, header.shape, Math.asin(radius) / header.rim * (rows - 1), turn / (2 * Math.PI) * (columns - 1));
-        const angle = (Math.atan2(u, q) / 2 * 180 / Math.PI + 180) % 180;
+        const angle = Math.atan2(u, q) / 2 * 180 / Math.PI;
         const name = fields.length > 1 ? `${header.models[i]}: ` : "";
         if (L <= 0) return `${name}in the shadow`;
-        return `${name}${written(L)} sr⁻¹, DoLP ${written(100 * Math.hypot(q, u))} %, AoLP ${angle.toFixed(1)}°, V/I ${written(100 * v)} %`;
+        return `${name}${written(L)} sr⁻¹, DoLP ${written(100 * Math.hypot(q, u))} %, AoLP ${written(Number(angle.toFixed(1)))}°, V/I ${written(100 * v)} %`;
       }).join("; ");
     }
 

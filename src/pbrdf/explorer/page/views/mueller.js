@@ -1,0 +1,48 @@
+// The Mueller matrix: sixteen small hemispheres. A click shows an element large, among the quantities.
+
+VIEWS.push({
+  name: "mueller",
+  title: "Mueller matrix",
+  build(place, app) {
+    const tables = app.catalogue.colours;
+    const board = new PictureBoard(place, tables);
+    board.node.classList.add("matrix");
+    const bars = [colourBar(tables), colourBar(tables)], titles = [element("span"), element("span")];
+    place.append(element("div", { class: "bars" }, ...bars.map((bar, i) => element("div", {}, titles[i], bar.node))));
+    const cells = [];
+    const update = () => cells.forEach(cell => cell.node.setAttribute("aria-pressed", String(app.state.quantities.includes(cell.quantity))));
+    const toggle = quantity => app.change(state => {
+      const others = state.quantities.filter(q => q !== quantity);
+      state.quantities = others.length < state.quantities.length ? others : [...others, quantity];
+      if (!state.quantities.length) state.quantities = ["intensity"];
+    });
+    app.on("state", update);
+    return {
+      show(header, [buffer]) {
+        if (header.error) return;
+        if (!cells.length) {
+          for (const { quantity, title } of header.pictures) {
+            const canvas = element("canvas", { "aria-hidden": "true" }), name = title.split(/[,/]/)[0];
+            const node = element("button", { type: "button", class: "cell", title: `show ${name} large`, onclick: () => toggle(quantity) },
+              element("span", { class: "square" }, canvas), element("span", { class: "name" }, name));
+            cells.push({ quantity, node, canvas });
+          }
+          board.node.append(...cells.map(cell => cell.node));
+          board.canvases = cells.map(cell => cell.canvas);
+          update();
+        }
+        // one range for all but m00, so that their colours compare
+        const [whole, ...rest] = header.pictures;
+        const widest = Math.max(...rest.flatMap(p => p.extent.map(Math.abs)));
+        for (const picture of rest) picture.extent = [-widest, widest];
+        board.load(header, buffer);
+        bars[0].show(whole, board.range(whole));
+        bars[1].show(rest[0], board.range(rest[0]));
+        titles[0].textContent = whole.title;
+        titles[1].textContent = header.compared ? "Differences of the others over m₀₀" : "The others, over m₀₀";
+        board.fit();
+        board.paint();
+      },
+    };
+  },
+});
