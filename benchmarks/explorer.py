@@ -202,7 +202,9 @@ def spread(values: list[float], form: str) -> str:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("prototype", nargs="?", type=Path, help="app_bin.py of the prototype")
     parser.add_argument("--moves", type=int, default=60)
     parser.add_argument("--chromium", default="/usr/bin/chromium", help="program of the browser")
@@ -230,7 +232,10 @@ def main() -> None:
         console.print(f"to pixels to be ≤ {TARGET_RATIO}")
     console.print(f"first picture to be ≤ {TARGET_FIRST:g} s after the server answers")
     if options.json:
-        measured = {s.name: {"ms": s.times, "bytes": s.bytes, "frame_ms": s.frames, "first_s": s.first} for s in subjects}
+        measured = {
+            s.name: {"ms": s.times, "bytes": s.bytes, "frame_ms": s.frames, "first_s": s.first}
+            for s in subjects
+        }
         options.json.write_text(json.dumps({"processor": processor(), **measured}, indent=1))
 
 

@@ -190,7 +190,9 @@ def fields(
         models.append(state.layers[state.compare].model)
     accuracy = "fast" if dragging else "default"
     matrices = [
-        _matrix(model.with_accuracy(accuracy), math.radians(state.light.theta_i), grid, state.part, not natural)
+        _matrix(
+            model.with_accuracy(accuracy), math.radians(state.light.theta_i), grid, state.part, not natural
+        )
         for model in models
     ]
     light = [dr.opaque(Float, x) for x in (s[:1] if natural else s)]
@@ -219,7 +221,9 @@ def fields(
         # a plane of its own for φ < 0 has its signs already
         sign = 1.0 if len(place) == 2 else _sign(quantity)
         low, high = _extent(packed[place[0]])
-        low2, high2 = sorted(sign * end for end in (_extent(packed[place[1]]) if len(place) == 2 else (low, high)))
+        low2, high2 = sorted(
+            sign * end for end in (_extent(packed[place[1]]) if len(place) == 2 else (low, high))
+        )
         pictures.append(Picture(quantity, place[0], place[-1], sign, (min(low, low2), max(high, high2))))
     return pictures, packed
 

@@ -52,7 +52,9 @@ def _ranges(settings: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
     given = settings.get("range", {})
     place = "settings.hemisphere.range"
     if not isinstance(given, Mapping):
-        raise StateError(place, "ranges of colours should be a JSON object: least and largest value by the quantity")
+        raise StateError(
+            place, "ranges of colours should be a JSON object: least and largest value by the quantity"
+        )
     found = {}
     for quantity, ends in given.items():
         if quantity not in QUANTITIES:
@@ -61,12 +63,16 @@ def _ranges(settings: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
             raise StateError(f"{place}.{quantity}", "a range of colours has a least and a largest value")
         low, high = (number(end, f"{place}.{quantity}") for end in ends)
         if not low < high:
-            raise StateError(f"{place}.{quantity}", "the least value of a range of colours is below its largest")
+            raise StateError(
+                f"{place}.{quantity}", "the least value of a range of colours is below its largest"
+            )
         found[quantity] = (low, high)
     return found
 
 
-def _fixed(picture: Mapping[str, Any], ranges: Mapping[str, tuple[float, float]]) -> tuple[float, float] | None:
+def _fixed(
+    picture: Mapping[str, Any], ranges: Mapping[str, tuple[float, float]]
+) -> tuple[float, float] | None:
     """A fixed range as the picture's planes count, None where it follows."""
     quantity = picture["quantity"]
     if quantity not in ranges or picture["colours"] == "cyclic":
