@@ -37,8 +37,8 @@ def angles(header, row, column):
         ("intensity", lambda f, S: S[0]),
         ("dolp", lambda f, S: np.hypot(S[1], S[2]) / S[0]),
         ("u", lambda f, S: S[2] / S[0]),
-        ("m23", lambda f, S: f[2, 3]),
-        ("m11", lambda f, S: f[1, 1]),
+        ("m23", lambda f, S: f[2, 3] / f[0, 0]),
+        ("m11", lambda f, S: f[1, 1] / f[0, 0]),
     ],
 )
 @pytest.mark.parametrize("stokes", [(1.0, 0.0, 0.0, 0.0), (1.0, 0.3, 0.4, 0.5)])
@@ -62,7 +62,7 @@ def test_vertices_are_the_matrix(paint, quantity, value, stokes):
 @pytest.mark.parametrize("quantity", ["intensity", "aolp", "u", "v", "m11", "m02", "m31"])
 def test_the_half_that_is_not_sent_is_mirrored(paint, quantity):
     header, [field] = drawn(paint, quantity=quantity, light=Light(40.0, (1.0, 0.3, 0.0, 0.0)))
-    whole, [full] = drawn(paint, quantity=quantity, light=Light(40.0, (1.0, 0.3, 0.0, 1e-300)))
+    whole, [full] = drawn(paint, quantity=quantity, light=Light(40.0, (1.0, 0.3, 0.0, 1e-12)))
     if quantity[0] == "m":
         f = paint.mueller(np.deg2rad(40.0), 0.8, np.array([0.7, -0.7]))[:, int(quantity[1]), int(quantity[2])]
         assert f[1] == pytest.approx(-f[0] if header["mirrored"] else f[0], abs=1e-14)
@@ -78,7 +78,7 @@ def test_the_half_that_is_not_sent_is_mirrored(paint, quantity):
         difference = np.minimum(difference, 1.0 - difference)
         # only where light is polarised has it an angle
         difference = difference[3:-3]
-    assert difference.max() < 2e-3
+    assert difference.max() < 4e-3
 
 
 def test_a_logarithmic_scale_ends_at_its_decades(paint):

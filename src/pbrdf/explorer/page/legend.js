@@ -13,7 +13,7 @@ class ColourLegend {
   show(table, ends, unit, about) {
     if (this.table !== table) this.bar.getContext("2d").putImageData(new ImageData(new Uint8ClampedArray(table), 256, 1), 0, 0);
     this.table = table;
-    [this.least.textContent, this.most.textContent] = ends.map(end => `${written(end)} ${unit}`);
+    [this.least.textContent, this.most.textContent] = ends.map(end => `${written(end)} ${unit}`.trim());
     this.about.textContent = about;
   }
 }

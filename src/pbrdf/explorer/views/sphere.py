@@ -13,12 +13,16 @@ without U and V, whose picture is its own mirror image, needs half of the direct
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
+from pbrdf.backend import get_backend
 from pbrdf.errors import DataError
+from pbrdf.explorer.evaluation import mueller_matrix
 from pbrdf.explorer.state import Light, State, StateError, number
 from pbrdf.explorer.workspace import Workspace
 from pbrdf.instruments.goniometer.rays import UPRIGHT, across, angles_of
@@ -42,20 +46,45 @@ RIM = 89.5
 POLARISERS = 361
 #: Largest number of float16, about.
 _MOST = 6.0e4
-_MIRROR = np.array([1.0, 1.0, -1.0, -1.0])
+_MIRROR = (1.0, 1.0, -1.0, -1.0)
 
 
-class _Ball(NamedTuple):
-    """Angles of the grid (rows, columns of a turn) and changes of frame: to the camera's, its matrix dimensions first,
-    and from the light's.
+@dataclass(frozen=True)
+class _Ball:
+    """The grid under a lamp, shapes (rows, columns of a turn).
+
+    Attributes
+    ----------
+    directions
+        θ_i, θ_r, φ, radians.
+    cosine
+        Of the angle of incidence, 0 in the shadow.
+    turn
+        cos2χ and sin2χ of the turn from (p, s) to the camera's axes.
+    light_turn
+        Those of the turn from the light's own (p, s) to that of the place.
     """
 
-    theta_i: np.ndarray
-    theta_r: np.ndarray
-    phi: np.ndarray
+    directions: tuple[np.ndarray, ...]
     cosine: np.ndarray
-    to_camera: np.ndarray
-    from_light: np.ndarray
+    turn: tuple[np.ndarray, np.ndarray]
+    light_turn: tuple[np.ndarray, np.ndarray]
+    _uploaded: dict[int, list[Any]] = field(default_factory=dict)
+
+    def angles(self, columns: int) -> list[Any]:
+        """Directions of the first columns in Dr.Jit's memory, where they stay."""
+        if columns not in self._uploaded:
+            backend = get_backend()
+            self._uploaded[columns] = [
+                backend.upload(backend.Float32, x[:, :columns].ravel()) for x in self.directions
+            ]
+        return self._uploaded[columns]
+
+    def incident(self, stokes: Sequence[float], columns: int) -> list[Any]:
+        """The light in the (p, s) of the places of the first columns."""
+        i, q, u, v = stokes
+        cos, sin = (x[:, :columns] for x in self.light_turn)
+        return [i, cos * q + sin * u, cos * u - sin * q, v]
 
 
 def draw(state: State, workspace: Workspace, dragging: bool) -> tuple[dict[str, Any], list[bytes]]:
@@ -82,7 +111,7 @@ def draw(state: State, workspace: Workspace, dragging: bool) -> tuple[dict[str, 
         "lamp": [math.degrees(lamp.polar), math.degrees(lamp.azimuth)],
         "models": [layer.name for layer in layers],
     }
-    return header, [*(field.astype("<f2").tobytes() for field in fields), _polarisers()]
+    return header, [*(one.astype("<f2").tobytes() for one in fields), _polarisers()]
 
 
 def picture(model: Model, lamp: Lamp, light: Light, part: str, shape: tuple[int, int]) -> np.ndarray:
@@ -109,23 +138,24 @@ def picture(model: Model, lamp: Lamp, light: Light, part: str, shape: tuple[int,
     """
     ball = _ball(lamp.polar, lamp.azimuth, *shape)
     halved = light.stokes[2] == light.stokes[3] == 0.0
-    lit = slice(0, shape[1]) if halved else slice(None)
-    angles = (ball.theta_i[:, lit], ball.theta_r, ball.phi[:, lit])
-    if light.stokes[1] == 0.0 and halved:
-        S = model.stokes(*angles, incident=light.stokes, part=part)
+    natural = halved and light.stokes[1] == 0.0
+    columns = shape[1] if halved else 2 * shape[1] - 1
+    theta_i, theta_r, phi = ball.angles(columns)
+    M = mueller_matrix(model, theta_i, theta_r, phi, part, whole=not natural)
+    size = shape[0] * columns
+    rows = [[np.broadcast_to(x.numpy(), size).reshape(shape[0], columns) for x in row] for row in M]
+    if natural:
+        S = [light.stokes[0] * row[0] for row in rows]
     else:
-        S = model.stokes(*angles, incident=ball.from_light[:, lit] @ np.array(light.stokes), part=part)
+        incident = ball.incident(light.stokes, columns)
+        S = [sum(x * y for x, y in zip(row, incident, strict=True)) for row in rows]
     if halved:
-        S = np.concatenate([S, S[:, -2::-1] * _MIRROR], axis=1)
-    inverse = 1.0 / np.maximum(S[..., 0], 1e-30)
-    field = np.empty_like(S)
-    np.minimum(S[..., 0] * ball.cosine, _MOST, out=field[..., 0])
-    # only the part of the matrices that is not 0 and 1
-    for row in (1, 2):
-        turned = ball.to_camera[row, 1] * S[..., 1] + ball.to_camera[row, 2] * S[..., 2]
-        np.multiply(turned, inverse, out=field[..., row])
-    np.multiply(S[..., 3], inverse, out=field[..., 3])
-    return field
+        S = [np.concatenate([x, sign * x[:, -2::-1]], axis=1) for x, sign in zip(S, _MIRROR, strict=True)]
+    inverse = 1.0 / np.maximum(S[0], 1e-30)
+    radiance = np.minimum(S[0] * ball.cosine, _MOST)
+    q, u, v = (x * inverse for x in S[1:])
+    cos, sin = ball.turn
+    return np.stack([radiance, cos * q + sin * u, cos * u - sin * q, v], axis=-1)
 
 
 @lru_cache(maxsize=4)
@@ -143,7 +173,7 @@ def _ball(polar: float, azimuth: float, rows: int, half: int) -> _Ball:
     view = PixelCamera().view(np.zeros(1), np.zeros(1))
     source = lamp.direction
     theta_i, _, phi = angles_of(normal, source, view)
-    to_camera = np.moveaxis(rotate_frame(-plane_rotation(normal, view, source)), (-2, -1), (0, 1)).copy()
+    to_camera = rotate_frame(-plane_rotation(normal, view, source))
     # the light's own p is that of the middle of the ball, also where the lamp is beside the camera
     level = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
     p = -np.cos(polar) * level + np.array([0.0, 0.0, np.sin(polar)])
@@ -155,25 +185,34 @@ def _ball(polar: float, azimuth: float, rows: int, half: int) -> _Ball:
         upright = np.array([-1.0, 0.0, 0.0])
     there = across(normal, source)
     there = np.where(np.linalg.norm(there, axis=-1, keepdims=True) < UPRIGHT, upright, there)
-    chi = np.arctan2(there @ s, there @ p)
+    to_place = rotate_frame(np.arctan2(there @ s, there @ p))
     most = math.radians(RIM)
+    shape = theta_i.shape
+    directions = tuple(np.broadcast_to(x, shape) for x in (np.minimum(theta_i, most), theta_r, phi))
     return _Ball(
-        np.minimum(theta_i, most), theta_r, phi, np.cos(theta_i).clip(0.0), to_camera, rotate_frame(chi)
+        directions,
+        np.cos(theta_i).clip(0.0).astype(np.float32),
+        _double_angle(to_camera),
+        _double_angle(to_place),
     )
+
+
+def _double_angle(frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """cos2χ and sin2χ of changes of frame."""
+    return frames[..., 1, 1].astype(np.float32), frames[..., 1, 2].astype(np.float32)
 
 
 def _ranges(fields: list[np.ndarray]) -> dict[str, float]:
     """Largest values that the colours of each mode stand for, in steps of 1, 2, 5."""
-    bright = np.all([field[..., 0] > 0.0 for field in fields], axis=0)
-    lit = [field[bright] for field in fields]
-    dolp = [np.hypot(field[..., 1], field[..., 2]) for field in lit]
-    if len(fields) == 1:
-        values = {"radiance": lit[0][..., 0], "dolp": dolp[0], "circular": lit[0][..., 3]}
-    else:
-        first, second = lit
-        values = {"radiance": first[..., 0] - second[..., 0], "dolp": dolp[0] - dolp[1]}
-        values["circular"] = first[..., 3] - second[..., 3]
-    return {name: _round_up(float(np.abs(v).max(initial=0.0))) for name, v in values.items()}
+    # where one of two models is dark there is nothing to compare
+    bright = np.all([one[..., 0] > 0.0 for one in fields], axis=0)
+    found = []
+    for one in fields:
+        L, q, u, v = np.moveaxis(one, -1, 0)
+        found.append([L, np.sqrt(q * q + u * u), v])
+    values = found[0] if len(found) == 1 else [a - b for a, b in zip(*found, strict=True)]
+    names = ("radiance", "dolp", "circular")
+    return {name: _round_up(float((np.abs(v) * bright).max())) for name, v in zip(names, values, strict=True)}
 
 
 def _round_up(value: float) -> float:

@@ -229,11 +229,9 @@ VIEWS.push({
     ];
 
     function tell() {
-      const signed = header.colours === "signed", angle = header.quantity === "aolp", most = angle ? 90 : header.most;
-      const unit = header.quantity === "intensity" || header.quantity[0] === "m" ? "sr⁻¹" : angle ? "°" : "";
+      const signed = header.colours === "signed", angle = header.colours === "cyclic", { most } = header;
       const low = header.scale === "logarithmic" && !signed && !angle ? most * 10 ** -header.decades : signed || angle ? -most : 0;
-      const name = quantityTitle(header.quantity);
-      legend.show(tables[header.colours], [low, most], unit, header.scale === "logarithmic" ? `${name}, ${header.decades} decades` : name);
+      legend.show(tables[header.colours], [low, most], "", header.scale === "logarithmic" && !angle ? `${header.title}, ${header.decades} decades` : header.title);
       models.replaceChildren(...header.layers.flatMap((layer, i) => [
         i ? swatch({ ...app.catalogue.looks[layer], dash: [] }) : "", `${i ? " net" : "surface"}: ${app.state.layers[layer]?.name ?? ""} `,
       ]));
@@ -267,11 +265,10 @@ VIEWS.push({
         best = { near: near - away / canvas.width, zenith, turn, share: values[cell + 2], beyond };
       }
       if (!best) { readout.textContent = "\u00a0"; return; }
-      const odd = best.beyond && header.mirrored, angle = header.quantity === "aolp";
+      const odd = best.beyond && header.mirrored;
       const share = odd ? -best.share : best.share, azimuth = best.turn > Math.PI ? best.turn - 2 * Math.PI : best.turn;
-      const value = angle ? `${written(Number((90 * share).toFixed(1)))}°` : written(share * header.most);
       const degrees = a => `${Math.round(a * 180 / Math.PI)}°`.replace("-", "−");
-      readout.textContent = `θr ${degrees(best.zenith)}, φ ${degrees(azimuth)}: ${quantityTitle(header.quantity)} ${value}`;
+      readout.textContent = `θr ${degrees(best.zenith)}, φ ${degrees(azimuth)}: ${header.title} ${written(share * header.most)}`;
     }
 
     const turned = (turn, tilt, dragging) => set({
