@@ -132,7 +132,7 @@ def test_the_token_of_another_start_is_none(served, token):
     "host", ["evil.example", "evil.example:{port}", "127.0.0.1", "127.0.0.1:1", "[::1]:{port}", ""]
 )
 def test_a_foreign_host_is_refused(address, token, host):
-    """Also where a name of elsewhere was made to point to this machine (DNS rebinding), and whoever has the token."""
+    """Also where a name of elsewhere was made to point to this machine (DNS rebinding), and with the token."""
     foreign = host.format(port=address.port)
     for path in (f"/?token={token}", f"/nothing?token={token}"):
         status, headers, text = get(address, path, Host=foreign)
@@ -226,9 +226,9 @@ def test_nothing_listens_elsewhere(address):
         pass
 
 
-def test_a_port_that_is_taken_is_a_sentence(address):
+def test_a_port_that_is_taken_is_a_sentence(address, apart):
     with pytest.raises(PbrdfError, match=f"port {address.port} cannot be used .*choose another"):
-        asyncio.run(serve(Workspace, address.port, print))
+        apart(asyncio.run, serve(Workspace, address.port, print))
 
 
 def test_a_frame_holds_numbers_of_json_alone():

@@ -2,6 +2,7 @@
 
 import asyncio
 import sys
+import threading
 import types
 
 import pytest
@@ -21,8 +22,8 @@ def notebook(monkeypatch):
 
 
 @pytest.fixture
-def widget(notebook, white, monkeypatch):
-    widget = pbrdf.explore(white, measured=pbrdf.open_experiment("white"))
+def widget(notebook, white, monkeypatch, apart):
+    widget = apart(lambda: pbrdf.explore(white, measured=pbrdf.open_experiment("white")))
     widget.sent = []
     monkeypatch.setattr(
         type(widget), "send", lambda self, content, buffers=None: self.sent.append((content, buffers))
@@ -59,9 +60,8 @@ def test_a_view_that_goes_leaves_the_widget_at_work(widget):
     assert len(widget.sent) == 1
 
 
-def test_answers_are_sent_by_the_thread_of_the_kernel(notebook, white, monkeypatch):
+def test_answers_are_sent_by_the_thread_of_the_kernel(notebook, white, monkeypatch, apart):
     """Marimo knows from no other thread where to send."""
-    import threading
 
     async def cell():
         widget = pbrdf.explore(white)
@@ -71,9 +71,9 @@ def test_answers_are_sent_by_the_thread_of_the_kernel(notebook, white, monkeypat
         while not threads:
             await asyncio.sleep(0.01)
         widget.close()
-        return threads
+        return threads == [threading.current_thread()]
 
-    assert asyncio.run(cell()) == [threading.current_thread()]
+    assert apart(lambda: asyncio.run(cell()))
 
 
 def test_what_it_shows(white):
