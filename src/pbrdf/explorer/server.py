@@ -16,12 +16,12 @@ from __future__ import annotations
 
 import asyncio
 import secrets
+import socket
 from collections.abc import Callable
 from contextlib import suppress
 from typing import Any, NamedTuple
 
 import tornado.httpserver
-import tornado.netutil
 import tornado.web
 import tornado.websocket
 
@@ -72,7 +72,9 @@ class _Guarded(tornado.web.RequestHandler):
         self.guard = guard
 
     def prepare(self) -> None:
-        if self.request.host not in self.guard.hosts:
+        origin = self.request.headers.get("Origin")
+        known = origin is None or origin in {f"http://{host}" for host in self.guard.hosts}
+        if not known or self.request.host not in self.guard.hosts:
             raise tornado.web.HTTPError(403, _FOREIGN)
 
     def set_default_headers(self) -> None:
@@ -114,9 +116,6 @@ class _Socket(_Guarded, tornado.websocket.WebSocketHandler):
         super().initialize(guard)
         self.open_workspace, self.pages = workspace, pages
         self.session: Session | None = None
-
-    def check_origin(self, origin: str) -> bool:
-        return origin in {f"http://{host}" for host in self.guard.hosts}
 
     def prepare(self) -> None:
         super().prepare()
@@ -176,13 +175,14 @@ async def serve(workspace: Callable[[], Workspace], port: int, ready: Callable[[
         If the port is taken or not allowed.
     """
     try:
-        sockets = tornado.netutil.bind_sockets(port, "127.0.0.1")
+        listening = socket.create_server(("127.0.0.1", port), backlog=128)
     except (OSError, OverflowError) as error:
         reason = getattr(error, "strerror", None) or error
         raise PbrdfError(
             f"port {port} cannot be used ({reason}): choose another, or leave it out for any that is free"
         ) from None
-    bound = sockets[0].getsockname()[1]
+    listening.setblocking(False)
+    bound = listening.getsockname()[1]
     # a cookie goes to all ports of a host, so each has a name of its own
     guard = _Guard(
         frozenset({f"127.0.0.1:{bound}", f"localhost:{bound}"}),
@@ -203,7 +203,7 @@ async def serve(workspace: Callable[[], Workspace], port: int, ready: Callable[[
     server = tornado.httpserver.HTTPServer(
         application, max_body_size=1 << 16, max_header_size=1 << 16, idle_connection_timeout=60.0
     )
-    server.add_sockets(sockets)
+    server.add_socket(listening)
     try:
         ready(f"http://127.0.0.1:{bound}/?token={guard.token}")
         await asyncio.Event().wait()

@@ -17,6 +17,7 @@ from pbrdf.errors import PbrdfError
 from pbrdf.explorer.catalogue import catalogue
 from pbrdf.explorer.messages import error_answer
 from pbrdf.explorer.state import StateError, read_state
+from pbrdf.explorer.uploads import MOST_BYTES
 from pbrdf.explorer.workspace import Workspace
 
 __all__ = ["REQUESTS", "VIEWS", "Emit", "Session"]
@@ -127,7 +128,8 @@ class Session:
     def _answer(self, content: dict[str, Any], buffers: Sequence[Any], turn: int) -> None:
         kind = content.get("type")
         if kind == "hello":
-            self.emit({"type": "welcome", "catalogue": catalogue(), "state": self.workspace.state()}, [])
+            welcome = {"catalogue": catalogue(), "state": self.workspace.state(), "most_bytes": MOST_BYTES}
+            self.emit({"type": "welcome", **welcome}, [])
         elif kind == "draw":
             self._draw(content, turn)
         elif kind == "goodbye":  # a notebook shows the same widget again

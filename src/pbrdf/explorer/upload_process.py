@@ -1,8 +1,8 @@
 """The process that reads a file which was dropped on the page; :mod:`pbrdf.explorer.uploads` starts it.
 
-It takes its task, one JSON object, from standard input and leaves what it has read as a pickle in the temporary folder:
-it runs as the same user, so it is a wall against files that crash, never end or ask for all memory, not against one that
-takes the process over. Limits are set before any library is loaded.
+It takes its task, one JSON object, from standard input and leaves what it has read as a pickle in the temporary folder.
+It runs as the same user, so it is a wall against files that crash, never end or ask for all memory, and not against one
+that takes the process over. Limits are set before any library is loaded.
 """
 
 from __future__ import annotations
