@@ -173,7 +173,7 @@ def test_exports(opened):
     with page.expect_download() as saved:
         page.get_by_role("button", name="Save", exact=True).click()
     assert saved.value.suggested_filename == "thick-plane.csv"
-    assert "# simulated: true" in saved.value.path().read_text()
+    assert "# simulated: 1" in saved.value.path().read_text()
     command = page.locator(".command code").inner_text()
     assert command == "pbrdf simulate thick.json --theta-i 35 --plane --output thick-plane.csv"
     page.get_by_label("What", exact=True).select_option("curves")
@@ -181,6 +181,54 @@ def test_exports(opened):
     with page.expect_download() as saved:
         page.get_by_role("button", name="Save", exact=True).click()
     assert "<svg" in saved.value.path().read_text()[:400]
+
+
+def test_a_lost_connection_is_said_and_found_again(served, page, white):
+    sockets = []
+
+    def between(socket):
+        sockets.append((socket, socket.connect_to_server()))
+
+    page.route_web_socket("**/socket*", between)
+    page.goto(served(lambda: Workspace([("thick", white)])))
+    page.wait_for_selector(".card canvas")
+    page.get_by_label("σ, number").fill("0.2")
+    page.get_by_label("σ, number").press("Enter")
+    sockets[0][0].close()
+    page.get_by_text("does not answer").wait_for()
+    page.get_by_text("does not answer").wait_for(state="hidden")
+    assert len(sockets) == 2
+    # what stood on the page still stands, and pictures come again
+    assert sigma(page) == 0.2
+    page.get_by_label("σ", exact=True).press("ArrowRight")
+    page.wait_for_function("() => !document.querySelector('.busy.on')")
+    assert sigma(page) > 0.2
+
+
+def test_nothing_is_left_when_the_explorer_goes(opened):
+    """In a notebook a cell is run again: the element is empty then, and no listener of the document remains."""
+    page = opened("thick")
+    left = page.evaluate(
+        """async () => {
+          const { default: explorer } = await import('/explorer.js');
+          const listeners = new Map();
+          const model = {
+            get: () => undefined, send: () => {},
+            on: (name, f) => listeners.set(f, name), off: (name, f) => listeners.delete(f),
+          };
+          const el = document.createElement('div');
+          document.body.append(el);
+          const added = [];
+          for (const target of [document, window]) {
+            const add = target.addEventListener;
+            target.addEventListener = (...given) => { added.push(given[0]); add.apply(target, given); };
+          }
+          const ids = [...document.querySelectorAll('[id]')].map(e => e.id);
+          explorer.render({ model, el })();
+          return [added, listeners.size, el.childElementCount, new Set(ids).size === ids.length];
+        }"""
+    )
+    assert left == [[], 0, 0, True]
 
 
 def test_keyboard_alone(opened):

@@ -27,6 +27,7 @@ VIEWS = {"hemisphere": "pbrdf.explorer.views.hemisphere"}
 REQUESTS: dict[str, str] = {
     "read_state": "pbrdf.explorer.reading",
     "export": "pbrdf.explorer.exports",
+    "previews": "pbrdf.explorer.previews",
 }
 #: Requests that wait, at most; a page waits for answers, so more come from no page of ours.
 _MOST_WAITING = 64

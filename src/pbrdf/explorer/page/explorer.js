@@ -38,7 +38,8 @@ function render({ model, el }) {
   app.on("drawing", () => busy.classList.add("on"));
   app.on("drawn", () => busy.classList.toggle("on", Boolean(app.wanted)));
 
-  el.addEventListener("keydown", event => {
+  // on the page all keys are the explorer's, in a notebook those in its cell
+  (inPage ? document : el).addEventListener("keydown", event => {
     const typing = event.target.matches("input:not([type=range]):not([type=radio]):not([type=checkbox]), textarea");
     if (!(event.ctrlKey || event.metaKey) || typing || event.altKey) return;
     const key = event.key.toLowerCase();
@@ -61,6 +62,7 @@ function render({ model, el }) {
       body.replaceChildren(...workbench.nodes);
     } else if (!app.state && !body.firstChild) body.append(emptyState(app, files));
     workbench?.update();
+    if (inPage && app.state) document.title = `${app.state.layers[app.state.active].name} · pbrdf explorer`;
   };
   app.on("state", show);
 
@@ -92,7 +94,7 @@ function render({ model, el }) {
 // The panels and the views of a state.
 function workbenchOf(app, root) {
   const side = element("aside", { class: "side", "aria-label": "Controls" });
-  const stage = element("div", { class: "stage", role: "group", "aria-label": "Pictures", tabindex: 0 });
+  const stage = element("div", { class: "stage", role: "group", "aria-label": "Pictures" });
   const bar = element("div", { class: "views", role: "toolbar", "aria-label": "Views" });
   const wide = root.clientWidth > 700;
   const panels = PANELS.map((panel, i) => {
