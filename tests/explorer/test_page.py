@@ -159,8 +159,15 @@ def test_nothing_open_a_paint_and_a_state_file(opened, tmp_path, white):
     page.get_by_label("name of the model").and_(page.locator(":visible")).first.wait_for()
     page.wait_for_function("() => document.querySelector('.name').value === 'mine'")
     assert state_of_page(page) == state
-    file.write_text(json.dumps({**state, "version": 7}))
-    page.locator("input[type=file]").set_input_files(file)
+    # a file that is dropped is opened as one that is chosen
+    dropped = """text => {
+      const data = new DataTransfer();
+      data.items.add(new File([text], 'sent.json'));
+      const stage = document.querySelector('.stage');
+      for (const name of ['dragover', 'drop'])
+        stage.dispatchEvent(new DragEvent(name, { dataTransfer: data, bubbles: true, cancelable: true }));
+    }"""
+    page.evaluate(dropped, json.dumps({**state, "version": 7}))
     page.get_by_text("sent.json: this state is of another version").wait_for()
     page.get_by_role("button", name="Undo").click()
     assert state_of_page(page)["layers"][0]["name"] == "pearl-white"

@@ -30,7 +30,7 @@ function render({ model, el }) {
   root.append(
     element("header", { class: "top" },
       element("p", { class: "brand" }, element("strong", {}, "pbrdf"), " explorer"), busy,
-      element("div", { class: "tools", role: "toolbar", "aria-label": "State and page" },
+      element("div", { class: "tools", role: "group", "aria-label": "State and page" },
         ofState[0], ofState[1], iconButton("open", "Open a file", files.choose), ...ofState.slice(2), theme, iconButton("help", "Help and keyboard", () => help.showModal()))),
     help);
   const body = element("div", { class: "body" });
@@ -83,8 +83,8 @@ function render({ model, el }) {
   app.on("answer:read_state", content => app.replace(content.state));
   app.on("answer:error", content => {
     // a state that was refused before anything was shown leaves the empty page
-    if (content.about === "read_state") { app.tell("note", content.text); if (!app.state) show(); return; }
-    if (content.about !== "draw") app.tell("note", content.text);
+    if (content.about === "read_state" && !app.state) show();
+    if (content.about !== "draw") app.tell("note", content.text, true);
   });
   app.on("connected", () => app.send({ type: "hello" }));
   app.send({ type: "hello" });
@@ -95,7 +95,7 @@ function render({ model, el }) {
 function workbenchOf(app, root) {
   const side = element("aside", { class: "side", "aria-label": "Controls" });
   const stage = element("div", { class: "stage", role: "group", "aria-label": "Pictures" });
-  const bar = element("div", { class: "views", role: "toolbar", "aria-label": "Views" });
+  const bar = element("div", { class: "views", role: "group", "aria-label": "Views" });
   const wide = root.clientWidth > 700;
   const panels = PANELS.map((panel, i) => {
     const place = element("div", { class: "inside" });
