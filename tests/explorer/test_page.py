@@ -20,11 +20,17 @@ SETTLED = 400
 
 @pytest.fixture
 def opened(served, page, white):
-    """A function that opens the explorer with some models and waits for the first picture."""
+    """A function that opens the explorer with some models, and few views to be quick: None for those of the page."""
 
-    def start(*models):
-        address = served(lambda: Workspace([(name, white) for name in models]))
-        page.goto(address)
+    def start(*models, views=("hemisphere",)):
+        def workspace():
+            found = Workspace([(name, white) for name in models])
+            if models and views:
+                state = {**found.state(), "settings": {"page": {"views": list(views)}}}
+                found.state = lambda: state
+            return found
+
+        page.goto(served(workspace))
         page.wait_for_selector(".card canvas" if models else ".paint")
         return page
 
@@ -32,7 +38,8 @@ def opened(served, page, white):
 
 
 def state_of_page(page):
-    page.wait_for_timeout(SETTLED)
+    # by the page's clock: it may be busy drawing
+    page.evaluate("ms => new Promise(done => setTimeout(done, ms))", SETTLED)
     return page.evaluate(STATE)
 
 
@@ -103,6 +110,7 @@ def test_sliders_numbers_undo_and_address(opened):
 
 def test_models_light_and_quantities(opened):
     page = opened("thick", "other")
+    side = page.get_by_role("complementary", name="Controls")
     page.get_by_role("button", name="Duplicate other").click()
     page.get_by_label("Difference to").select_option(label="thick")
     page.get_by_role("button", name="Hide other", exact=True).click()
@@ -115,7 +123,7 @@ def test_models_light_and_quantities(opened):
     state = state_of_page(page)
     assert (state["active"], state["compare"]) == (2, None)
     page.get_by_label("shadowing").select_option("none")
-    page.get_by_label("linear", exact=True).check()
+    side.get_by_label("linear", exact=True).check()
     angle = page.locator(".light").get_by_label("α, number")
     angle.fill("45")
     angle.press("Enter")
@@ -124,10 +132,10 @@ def test_models_light_and_quantities(opened):
     state = state_of_page(page)
     assert state["light"]["stokes"] == [1, 0, 0.5, 0]
     assert state["layers"][2]["options"]["shadowing"] == "none"
-    page.get_by_label("circular", exact=True).check()
-    page.get_by_label("right (V < 0)").check()
+    side.get_by_label("circular", exact=True).check()
+    side.get_by_label("right (V < 0)").check()
     assert state_of_page(page)["light"]["stokes"] == [1, 0, 0, -0.5]
-    page.get_by_label("I Q U V").check()
+    side.get_by_label("I Q U V").check()
     page.get_by_label("Q of the light").fill("2")
     page.get_by_label("Q of the light").press("Enter")
     # what only Dr.Jit's side knows to be wrong is said beside the numbers
@@ -137,7 +145,7 @@ def test_models_light_and_quantities(opened):
     page.get_by_role("button", name="Undo").click()
     page.locator("[data-place='light.stokes'] .fault.said").wait_for(state="detached")
     page.get_by_role("button", name="Q over I").click()
-    page.get_by_label("of the body").check()
+    side.get_by_label("of the body", exact=True).check()
     state = state_of_page(page)
     assert state["quantities"] == ["intensity", "dolp", "q"]
     assert state["part"] == "diffuse"
@@ -292,7 +300,7 @@ def faults_found(page):
 @pytest.mark.parametrize("models", [(), ("thick", "other")], ids=["empty", "full"])
 def test_axe_finds_no_serious_fault(opened, models):
     pytest.importorskip("axe_playwright_python")
-    page = opened(*models)
+    page = opened(*models, views=None)
     assert page.evaluate("document.querySelector('.pbrdf-explorer').dataset.theme") == "light"
     page.evaluate("for (const e of document.querySelectorAll('details')) e.open = true")
     # axe looks at colours as they are, not at what they turn into
