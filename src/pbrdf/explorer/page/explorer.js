@@ -254,6 +254,7 @@ function helpOf(inPage) {
     element("header", {}, element("h2", {}, "Help"), iconButton("remove", "Close the help", () => dialog.close())),
     element("p", {}, "Everything is computed by pbrdf on this machine; the page only draws. While a slider moves the pictures are quick ones, at rest they have the library's default accuracy."),
     element("p", {}, inPage ? "The address always holds what is shown: reload it, keep it, or save the state to a file to send it. Nothing leaves this machine, and nothing is written unless you save it." : "Save the state to a file to keep or send what is shown."),
+    element("p", {}, "Angles are in degrees. Azimuth 0 is the forward half-plane, where a mirror reflects to; in the plane of incidence negative viewing angles are on the source's side. Q > 0 is polarised in the plane of direction and normal (p), V > 0 turns anticlockwise for the receiver."),
     element("dl", {}, keys.flatMap(([key, does]) => [element("dt", {}, key), element("dd", {}, does)])));
   return dialog;
 }
