@@ -20,11 +20,17 @@ SETTLED = 400
 
 @pytest.fixture
 def opened(served, page, white):
-    """A function that opens the explorer with some models and waits for the first picture."""
+    """A function that opens the explorer with some models, and few views to be quick: None for those of the page."""
 
-    def start(*models):
-        address = served(lambda: Workspace([(name, white) for name in models]))
-        page.goto(address)
+    def start(*models, views=("hemisphere",)):
+        def workspace():
+            found = Workspace([(name, white) for name in models])
+            if models and views:
+                state = {**found.state(), "settings": {"page": {"views": list(views)}}}
+                found.state = lambda: state
+            return found
+
+        page.goto(served(workspace))
         page.wait_for_selector(".card canvas" if models else ".paint")
         return page
 
@@ -32,7 +38,8 @@ def opened(served, page, white):
 
 
 def state_of_page(page):
-    page.wait_for_timeout(SETTLED)
+    # by the page's clock: it may be busy drawing
+    page.evaluate("ms => new Promise(done => setTimeout(done, ms))", SETTLED)
     return page.evaluate(STATE)
 
 
@@ -103,6 +110,7 @@ def test_sliders_numbers_undo_and_address(opened):
 
 def test_models_light_and_quantities(opened):
     page = opened("thick", "other")
+    side = page.get_by_role("complementary", name="Controls")
     page.get_by_role("button", name="Duplicate other").click()
     page.get_by_label("Difference to").select_option(label="thick")
     page.get_by_role("button", name="Hide other", exact=True).click()
@@ -115,7 +123,7 @@ def test_models_light_and_quantities(opened):
     state = state_of_page(page)
     assert (state["active"], state["compare"]) == (2, None)
     page.get_by_label("shadowing").select_option("none")
-    page.get_by_label("linear", exact=True).check()
+    side.get_by_label("linear", exact=True).check()
     angle = page.locator(".light").get_by_label("α, number")
     angle.fill("45")
     angle.press("Enter")
@@ -124,10 +132,10 @@ def test_models_light_and_quantities(opened):
     state = state_of_page(page)
     assert state["light"]["stokes"] == [1, 0, 0.5, 0]
     assert state["layers"][2]["options"]["shadowing"] == "none"
-    page.get_by_label("circular", exact=True).check()
-    page.get_by_label("right (V < 0)").check()
+    side.get_by_label("circular", exact=True).check()
+    side.get_by_label("right (V < 0)").check()
     assert state_of_page(page)["light"]["stokes"] == [1, 0, 0, -0.5]
-    page.get_by_label("I Q U V").check()
+    side.get_by_label("I Q U V").check()
     page.get_by_label("Q of the light").fill("2")
     page.get_by_label("Q of the light").press("Enter")
     # what only Dr.Jit's side knows to be wrong is said beside the numbers
@@ -137,7 +145,7 @@ def test_models_light_and_quantities(opened):
     page.get_by_role("button", name="Undo").click()
     page.locator("[data-place='light.stokes'] .fault.said").wait_for(state="detached")
     page.get_by_role("button", name="Q over I").click()
-    page.get_by_label("of the body").check()
+    side.get_by_label("of the body", exact=True).check()
     state = state_of_page(page)
     assert state["quantities"] == ["intensity", "dolp", "q"]
     assert state["part"] == "diffuse"
@@ -159,8 +167,15 @@ def test_nothing_open_a_paint_and_a_state_file(opened, tmp_path, white):
     page.get_by_label("name of the model").and_(page.locator(":visible")).first.wait_for()
     page.wait_for_function("() => document.querySelector('.name').value === 'mine'")
     assert state_of_page(page) == state
-    file.write_text(json.dumps({**state, "version": 7}))
-    page.locator("input[type=file]").set_input_files(file)
+    # a file that is dropped is opened as one that is chosen
+    dropped = """text => {
+      const data = new DataTransfer();
+      data.items.add(new File([text], 'sent.json'));
+      const stage = document.querySelector('.stage');
+      for (const name of ['dragover', 'drop'])
+        stage.dispatchEvent(new DragEvent(name, { dataTransfer: data, bubbles: true, cancelable: true }));
+    }"""
+    page.evaluate(dropped, json.dumps({**state, "version": 7}))
     page.get_by_text("sent.json: this state is of another version").wait_for()
     page.get_by_role("button", name="Undo").click()
     assert state_of_page(page)["layers"][0]["name"] == "pearl-white"
@@ -173,7 +188,7 @@ def test_exports(opened):
     with page.expect_download() as saved:
         page.get_by_role("button", name="Save", exact=True).click()
     assert saved.value.suggested_filename == "thick-plane.csv"
-    assert "# simulated: true" in saved.value.path().read_text()
+    assert "# simulated: 1" in saved.value.path().read_text()
     command = page.locator(".command code").inner_text()
     assert command == "pbrdf simulate thick.json --theta-i 35 --plane --output thick-plane.csv"
     page.get_by_label("What", exact=True).select_option("curves")
@@ -181,6 +196,54 @@ def test_exports(opened):
     with page.expect_download() as saved:
         page.get_by_role("button", name="Save", exact=True).click()
     assert "<svg" in saved.value.path().read_text()[:400]
+
+
+def test_a_lost_connection_is_said_and_found_again(served, page, white):
+    sockets = []
+
+    def between(socket):
+        sockets.append((socket, socket.connect_to_server()))
+
+    page.route_web_socket("**/socket*", between)
+    page.goto(served(lambda: Workspace([("thick", white)])))
+    page.wait_for_selector(".card canvas")
+    page.get_by_label("σ, number").fill("0.2")
+    page.get_by_label("σ, number").press("Enter")
+    sockets[0][0].close()
+    page.get_by_text("does not answer").wait_for()
+    page.get_by_text("does not answer").wait_for(state="hidden")
+    assert len(sockets) == 2
+    # what stood on the page still stands, and pictures come again
+    assert sigma(page) == 0.2
+    page.get_by_label("σ", exact=True).press("ArrowRight")
+    page.wait_for_function("() => !document.querySelector('.busy.on')")
+    assert sigma(page) > 0.2
+
+
+def test_nothing_is_left_when_the_explorer_goes(opened):
+    """In a notebook a cell is run again: the element is empty then, and no listener of the document remains."""
+    page = opened("thick")
+    left = page.evaluate(
+        """async () => {
+          const { default: explorer } = await import('/explorer.js');
+          const listeners = new Map();
+          const model = {
+            get: () => undefined, send: () => {},
+            on: (name, f) => listeners.set(f, name), off: (name, f) => listeners.delete(f),
+          };
+          const el = document.createElement('div');
+          document.body.append(el);
+          const added = [];
+          for (const target of [document, window]) {
+            const add = target.addEventListener;
+            target.addEventListener = (...given) => { added.push(given[0]); add.apply(target, given); };
+          }
+          const ids = [...document.querySelectorAll('[id]')].map(e => e.id);
+          explorer.render({ model, el })();
+          return [added, listeners.size, el.childElementCount, new Set(ids).size === ids.length];
+        }"""
+    )
+    assert left == [[], 0, 0, True]
 
 
 def test_keyboard_alone(opened):
@@ -237,7 +300,7 @@ def faults_found(page):
 @pytest.mark.parametrize("models", [(), ("thick", "other")], ids=["empty", "full"])
 def test_axe_finds_no_serious_fault(opened, models):
     pytest.importorskip("axe_playwright_python")
-    page = opened(*models)
+    page = opened(*models, views=None)
     assert page.evaluate("document.querySelector('.pbrdf-explorer').dataset.theme") == "light"
     page.evaluate("for (const e of document.querySelectorAll('details')) e.open = true")
     # axe looks at colours as they are, not at what they turn into

@@ -178,10 +178,11 @@ def _table(state: State, what: str) -> Export:
         where = ["--theta-r", _range(zeniths), "--phi", _range(azimuths)]
     angles = [np.deg2rad(a) for a in (np.full_like(theta_r, theta_i), theta_r, phi)]
     stokes = np.asarray(layer.model.stokes(*angles, incident=light, part=state.part))
+    columns: dict[str, Any] = {name: stokes[:, i] for i, name in enumerate("IQUV")}
     dataset = make_dataset(
         *angles,
         quantity="brdf",
-        **{name: stokes[:, i] for i, name in enumerate("IQUV")},
+        **columns,
         wavelength=WAVELENGTH if source in PAINTS else None,
         group=np.full(len(theta_r), round(theta_i)),
         illumination=light,

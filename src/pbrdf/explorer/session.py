@@ -36,6 +36,7 @@ VIEWS = {
 REQUESTS: dict[str, str] = {
     "export": "pbrdf.explorer.exports",
     "open": "pbrdf.explorer.uploads",
+    "previews": "pbrdf.explorer.previews",
     "read_state": "pbrdf.explorer.reading",
 }
 #: Requests that wait, at most; a page waits for answers, so more come from no page of ours.

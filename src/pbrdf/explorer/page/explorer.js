@@ -30,7 +30,7 @@ function render({ model, el }) {
   root.append(
     element("header", { class: "top" },
       element("p", { class: "brand" }, element("strong", {}, "pbrdf"), " explorer"), busy,
-      element("div", { class: "tools", role: "toolbar", "aria-label": "State and page" },
+      element("div", { class: "tools", role: "group", "aria-label": "State and page" },
         ofState[0], ofState[1], iconButton("open", "Open a file", files.choose), ...ofState.slice(2), theme, iconButton("help", "Help and keyboard", () => help.showModal()))),
     help);
   const body = element("div", { class: "body" });
@@ -38,7 +38,8 @@ function render({ model, el }) {
   app.on("drawing", () => busy.classList.add("on"));
   app.on("drawn", () => busy.classList.toggle("on", Boolean(app.wanted)));
 
-  el.addEventListener("keydown", event => {
+  // on the page all keys are the explorer's, in a notebook those in its cell
+  (inPage ? document : el).addEventListener("keydown", event => {
     const typing = event.target.matches("input:not([type=range]):not([type=radio]):not([type=checkbox]), textarea");
     if (!(event.ctrlKey || event.metaKey) || typing || event.altKey) return;
     const key = event.key.toLowerCase();
@@ -61,6 +62,7 @@ function render({ model, el }) {
       body.replaceChildren(...workbench.nodes);
     } else if (!app.state && !body.firstChild) body.append(emptyState(app, files));
     workbench?.update();
+    if (inPage && app.state) document.title = `${app.state.layers[app.state.active].name} · pbrdf explorer`;
   };
   app.on("state", show);
 
@@ -81,8 +83,8 @@ function render({ model, el }) {
   app.on("answer:read_state", content => app.replace(content.state));
   app.on("answer:error", content => {
     // a state that was refused before anything was shown leaves the empty page
-    if (content.about === "read_state") { app.tell("note", content.text); if (!app.state) show(); return; }
-    if (content.about !== "draw") app.tell("note", content.text);
+    if (content.about === "read_state" && !app.state) show();
+    if (content.about !== "draw") app.tell("note", content.text, true);
   });
   app.on("connected", () => app.send({ type: "hello" }));
   app.send({ type: "hello" });
@@ -92,8 +94,8 @@ function render({ model, el }) {
 // The panels and the views of a state.
 function workbenchOf(app, root) {
   const side = element("aside", { class: "side", "aria-label": "Controls" });
-  const stage = element("div", { class: "stage", role: "group", "aria-label": "Pictures", tabindex: 0 });
-  const bar = element("div", { class: "views", role: "toolbar", "aria-label": "Views" });
+  const stage = element("div", { class: "stage", role: "group", "aria-label": "Pictures" });
+  const bar = element("div", { class: "views", role: "group", "aria-label": "Views" });
   const wide = root.clientWidth > 700;
   const panels = PANELS.map((panel, i) => {
     const place = element("div", { class: "inside" });
@@ -252,6 +254,7 @@ function helpOf(inPage) {
     element("header", {}, element("h2", {}, "Help"), iconButton("remove", "Close the help", () => dialog.close())),
     element("p", {}, "Everything is computed by pbrdf on this machine; the page only draws. While a slider moves the pictures are quick ones, at rest they have the library's default accuracy."),
     element("p", {}, inPage ? "The address always holds what is shown: reload it, keep it, or save the state to a file to send it. Nothing leaves this machine, and nothing is written unless you save it." : "Save the state to a file to keep or send what is shown."),
+    element("p", {}, "Angles are in degrees. Azimuth 0 is the forward half-plane, where a mirror reflects to; in the plane of incidence negative viewing angles are on the source's side. Q > 0 is polarised in the plane of direction and normal (p), V > 0 turns anticlockwise for the receiver."),
     element("dl", {}, keys.flatMap(([key, does]) => [element("dt", {}, key), element("dd", {}, does)])));
   return dialog;
 }
