@@ -10,8 +10,8 @@ Each of the two has a process of its own with kernel caches of its own, which be
 Chromium with software GL. In every turn one slider is moved to the same value in both, and who begins alternates. Time
 is taken in the page, from before the ``input`` event until the pixels of all pictures are there: in both one pixel of
 each canvas is read back, so that the drawing has ended; and until the second animation frame after that, when the page
-with its pictures has been put together. Only then is it the other's turn. The first picture is timed from the start of the navigation,
-with and without kernels on disk.
+with its pictures has been put together. Only then is it the other's turn. The first picture is timed from the start of
+the navigation, with and without kernels on disk.
 """
 
 from __future__ import annotations

@@ -34,21 +34,21 @@ def truth(model, shown, phi):
     theta_i = np.deg2rad(shown.light.theta_i)
     M = model.mueller(theta_i, THETA, phi, part=shown.part)
     S = M @ np.asarray(shown.light.stokes)
-    I, m00 = S[..., 0], M[..., 0, 0]
+    intensity, m00 = S[..., 0], M[..., 0, 0]
 
     def expected(quantity):
         if quantity == "intensity":
-            return np.log10(np.maximum(I, DARK))
+            return np.log10(np.maximum(intensity, DARK))
         if quantity == "m00":
             return np.log10(np.maximum(m00, DARK))
         with np.errstate(invalid="ignore", divide="ignore"):
             if quantity in ("dolp", "aolp"):
                 found = dolp(S) if quantity == "dolp" else np.rad2deg(aolp(S))
             elif quantity in "quv":
-                found = S[..., "iquv".index(quantity)] / I
+                found = S[..., "iquv".index(quantity)] / intensity
             else:
                 return np.where(m00 > DARK, M[..., int(quantity[1]), int(quantity[2])] / m00, 0.0)
-        return np.where(I > DARK, found, 0.0)
+        return np.where(intensity > DARK, found, 0.0)
 
     return expected
 
@@ -70,7 +70,7 @@ def compare(shown, quantities, dragging=False, tolerance=6e-4):
     for picture in pictures:
         for half, expected in zip(whole(picture, planes), truths, strict=True):
             assert_shown(half, expected(picture.quantity), picture.quantity, expected("dolp"), tolerance)
-            inside = half[:-1]
+            inside = half[: int(0.95 * (GRID.zeniths - 1)) + 1]
             if picture.quantity != "aolp":
                 assert picture.extent[0] <= inside.min()
                 assert inside.max() <= picture.extent[1]

@@ -61,7 +61,7 @@ class Picture:
     mirrored, sign
         Which plane holds it for φ < 0, at −φ, and by what it is multiplied there.
     extent
-        Least and largest value inside of the horizon, φ of both signs.
+        Least and largest value to a zenith angle of 85.5°, φ of both signs.
     """
 
     quantity: str
@@ -249,8 +249,8 @@ def fields(
 
 
 def _extent(plane: np.ndarray) -> tuple[float, float]:
-    """Least and largest number of a plane, without the horizon, where there is no light."""
-    seen = plane[:-1].astype(np.float32)
+    """Least and largest number of a plane to 85.5°: along the horizon there is no light."""
+    seen = plane[: int(0.95 * (len(plane) - 1)) + 1].astype(np.float32)
     return float(np.fmin.reduce(seen, axis=None)), float(np.fmax.reduce(seen, axis=None))
 
 
@@ -275,10 +275,12 @@ def described(picture: Picture, difference: bool) -> dict[str, Any]:
     else:
         colours = "sequential" if (logarithmic or picture.quantity == "dolp") and not difference else "signed"
     title = _LABELS[picture.quantity]
+    symbol = title.split(",")[0]
     if difference:
-        title = f"log₁₀ of the ratio of {title.split(',')[0]}" if logarithmic else f"Difference of {title}"
+        title = f"log₁₀ of the ratio of {symbol}" if logarithmic else f"Difference of {title}"
     return {
         "quantity": picture.quantity,
+        "symbol": symbol.split("/m")[0],
         "title": title,
         "plane": picture.plane,
         "mirrored": picture.mirrored,
@@ -309,7 +311,7 @@ def _kernel(state: State, quantities: Sequence[str], dragging: bool) -> Any:
 
 
 def prepare(state: State, quantities: Sequence[str], grid: Grid) -> threading.Thread | None:
-    """Compile beside what goes on here what the first drag of a slider needs; the thread that does it, if any is due."""
+    """Compile in a thread what the first drag of a slider needs; the thread, None where it is compiled already."""
     _compiled.add(_kernel(state, quantities, False))
     wanted = _kernel(state, quantities, True)
     if wanted in _compiled:

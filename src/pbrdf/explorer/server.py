@@ -17,6 +17,7 @@ from __future__ import annotations
 import asyncio
 import secrets
 import socket
+import threading
 from collections.abc import Callable
 from contextlib import suppress
 from typing import Any, NamedTuple
@@ -26,6 +27,7 @@ import tornado.web
 import tornado.websocket
 
 from pbrdf.errors import DataError, PbrdfError
+from pbrdf.explorer.catalogue import catalogue
 from pbrdf.explorer.messages import pack, unpack
 from pbrdf.explorer.module import PAGE, module_text
 from pbrdf.explorer.session import Session
@@ -204,6 +206,8 @@ async def serve(workspace: Callable[[], Workspace], port: int, ready: Callable[[
         application, max_body_size=1 << 16, max_header_size=1 << 16, idle_connection_timeout=60.0
     )
     server.add_socket(listening)
+    # what the first page asks for is put together while the browser opens
+    threading.Thread(target=catalogue, name="pbrdf catalogue").start()
     try:
         ready(f"http://127.0.0.1:{bound}/?token={guard.token}")
         await asyncio.Event().wait()

@@ -74,7 +74,15 @@ function halfNumber(bits) {
   return sign * (exponent ? 2 ** (exponent - 15) * (1 + fraction / 1024) : fraction * 2 ** -24);
 }
 let halfNumbers = null;
-const allHalfNumbers = () => halfNumbers ??= Float32Array.from({ length: 65536 }, (_, bits) => halfNumber(bits));
+function allHalfNumbers() {
+  if (halfNumbers) return halfNumbers;
+  halfNumbers = new Float32Array(65536);
+  for (let exponent = 0; exponent < 65536; exponent += 1024) {
+    const first = halfNumber(exponent), step = halfNumber(exponent + 1) - first;
+    for (let fraction = 0; fraction < 1024; fraction++) halfNumbers[exponent + fraction] = first + fraction * step;
+  }
+  return halfNumbers;
+}
 
 // Fields over hemispheres are painted here and not in a shader: for a picture of 450 by 450 pixels that takes a
 // millisecond on any machine, less than to send it to the graphics and to wait for them.
@@ -249,6 +257,7 @@ function colourBar(tables) {
   const ends = [0, 1, 2].map(() => element("span"));
   let shown = "";
   return {
+    ends: [ends[0], ends[2]],
     node: element("div", { class: "colour-bar" }, bar, element("div", { class: "ends" }, ...ends)),
     show(picture, range) {
       if (shown !== picture.colours) {

@@ -54,6 +54,8 @@ class PictureBoard {
     const size = Math.max(Math.round(this.canvases[0].getBoundingClientRect().width * devicePixelRatio), 1);
     const other = this.canvases.filter(canvas => canvas.width !== size || canvas.height !== size);
     other.forEach(canvas => Object.assign(canvas, { width: size, height: size }));
+    // letters of 11 pixels at least, in the units of the pictures
+    this.node.style.setProperty("--letter", `${Math.max(0.062, 11 * devicePixelRatio * 2 * HEMISPHERE_REACH / size)}px`);
     return other.length > 0;
   }
 
@@ -136,10 +138,10 @@ VIEWS.push({
         const ends = ["least", "largest"].map(which => element("input", {
           type: "number", step: "any", "aria-label": `${which} value of the colours`, onchange: () => figure.set(),
         }));
-        const fixed = element("span", { class: "fixed", hidden: true }, ends[0], " to ", ends[1]);
+        bar.ends.forEach((end, i) => end.after(ends[i]));
         const figure = {
           rings, canvas,
-          node: element("figure", {}, element("figcaption", {}, title, fixed, fix), square, bar.node),
+          node: element("figure", {}, element("figcaption", {}, title, fix), square, bar.node),
           shown: () => board.range(figure.picture).map(v => Number((figure.picture.logarithmic ? 10 ** v : v).toPrecision(3))),
           toggle() { setRange(figure.picture.quantity, figure.picture.range ? null : figure.shown()); },
           set() { setRange(figure.picture.quantity, ends.map(input => input.valueAsNumber)); },
@@ -149,9 +151,9 @@ VIEWS.push({
             bar.show(picture, range);
             if (title.textContent !== picture.title) title.textContent = picture.title;
             fix.hidden = picture.colours === "cyclic";
-            fixed.hidden = !picture.range;
+            ends.forEach((input, i) => { input.hidden = !picture.range; bar.ends[i].hidden = !input.hidden; });
             fix.setAttribute("aria-pressed", String(Boolean(picture.range)));
-            if (picture.range && !fixed.contains(document.activeElement)) figure.shown().forEach((v, i) => { ends[i].value = v; });
+            if (picture.range && !ends.includes(document.activeElement)) figure.shown().forEach((v, i) => { ends[i].value = v; });
             rings.light(header.theta_i);
           },
           name() {

@@ -21,10 +21,10 @@ VIEWS.push({
       show(header, [buffer]) {
         if (header.error) return;
         if (!cells.length) {
-          for (const { quantity, title } of header.pictures) {
-            const canvas = element("canvas", { "aria-hidden": "true" }), name = title.split(/[,/]/)[0];
-            const node = element("button", { type: "button", class: "cell", title: `show ${name} large`, onclick: () => toggle(quantity) },
-              element("span", { class: "square" }, canvas), element("span", { class: "name" }, name));
+          for (const { quantity, symbol } of header.pictures) {
+            const canvas = element("canvas", { "aria-hidden": "true" });
+            const node = element("button", { type: "button", class: "cell", title: `show ${symbol} large`, onclick: () => toggle(quantity) },
+              element("span", { class: "square" }, canvas), element("span", { class: "name" }, symbol));
             cells.push({ quantity, node, canvas });
           }
           board.node.append(...cells.map(cell => cell.node));
