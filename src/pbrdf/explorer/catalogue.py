@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from pbrdf.data.paints import PAINTS, load_paint
-from pbrdf.explorer.state import QUANTITIES, VERSION
+from pbrdf.explorer.state import MOST_LAYERS, QUANTITIES, VERSION
 from pbrdf.models.base import PARTS, Model
 from pbrdf.models.parameters import Parameter
 from pbrdf.models.registry import MODELS
@@ -20,6 +20,8 @@ __all__ = ["catalogue", "layer_of", "state_of"]
 
 #: Colour tables by what they are for, Matplotlib's names: even steps look even, also to the colour-blind.
 COLOURS = {"sequential": "cividis", "signed": "RdBu_r", "cyclic": "twilight"}
+#: Lengths of strokes and gaps of the lines of :mod:`pbrdf.report.together.curves`, in their order; none for no gaps.
+_DASHES: tuple[tuple[float, ...], ...] = ((), (7.0, 3.0), (7.0, 2.5, 1.5, 2.5), (1.5, 2.5))
 
 
 def layer_of(name: str, model: Model) -> dict[str, Any]:
@@ -46,6 +48,7 @@ def catalogue() -> dict[str, Any]:
     """Everything that the page asks for once, as plain JSON."""
     return {
         "version": VERSION,
+        "looks": _looks(),
         "quantities": list(QUANTITIES),
         "parts": list(PARTS),
         "models": {
@@ -79,6 +82,16 @@ def _parameter(p: Parameter) -> dict[str, Any]:
         "fitted": p.fitted,
         "logarithmic": p.logarithmic,
     }
+
+
+def _looks() -> list[dict[str, Any]]:
+    """Colour, marker and dashes of each layer, those of pbrdf's figures of several models."""
+    from pbrdf.report.style import looks_of
+
+    return [
+        {"colour": look.colour, "marker": look.marker, "dash": _DASHES[i % len(_DASHES)]}
+        for i, look in enumerate(looks_of(MOST_LAYERS))
+    ]
 
 
 def _table(name: str) -> str:

@@ -14,7 +14,17 @@ __all__ = ["PAGE", "module_text"]
 #: Folder of the files.
 PAGE = Path(__file__).parent / "page"
 #: The files of the module, in order; a file uses names of those before it.
-PARTS = ("elements.js", "graphics.js", "application.js", "views/hemisphere.js", "controls.js", "explorer.js")
+PARTS = (
+    "elements.js",
+    "graphics.js",
+    "application.js",
+    "views/hemisphere.js",
+    "views/cuts.js",
+    "controls.js",
+    "panels/data.js",
+    "panels/fit.js",
+    "explorer.js",
+)
 
 
 @cache

@@ -21,10 +21,17 @@ __all__ = ["REQUESTS", "VIEWS", "Emit", "Session"]
 #: Sends a JSON object and buffers to the page, from any thread.
 Emit = Callable[[Mapping[str, Any], Sequence[bytes | memoryview]], None]
 #: Modules of the views by name; each has ``draw(state, workspace, dragging)`` that gives a header and buffers.
-VIEWS = {"hemisphere": "pbrdf.explorer.views.hemisphere"}
+VIEWS = {
+    "hemisphere": "pbrdf.explorer.views.hemisphere",
+    "cuts": "pbrdf.explorer.views.cuts",
+}
 #: Modules that answer the other requests, by the request's type; each has
 #: ``answer(request, buffers, workspace, emit)``.
-REQUESTS: dict[str, str] = {}
+REQUESTS: dict[str, str] = {
+    "data": "pbrdf.explorer.points",
+    "fit": "pbrdf.explorer.fitting",
+    "cancel_fit": "pbrdf.explorer.fitting",
+}
 #: Requests that wait, at most; a page waits for answers, so more come from no page of ours.
 _MOST_WAITING = 64
 

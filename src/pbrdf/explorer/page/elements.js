@@ -12,6 +12,14 @@ function element(name, attributes = {}, ...children) {
   return node;
 }
 
+// An SVG element, likewise.
+function drawn(name, attributes = {}, ...children) {
+  const node = document.createElementNS("http://www.w3.org/2000/svg", name);
+  for (const [key, value] of Object.entries(attributes)) node.setAttribute(key, value);
+  node.append(...children);
+  return node;
+}
+
 // Elements have ids of their own for labels: a notebook may hold several explorers.
 let elementCount = 0;
 const freshId = name => `pbrdf-${name}-${++elementCount}`;
