@@ -119,7 +119,7 @@ class FitProcess:
 
     def _follow(self, job: _Job, content: dict[str, Any]) -> None:
         """Hand the job over and tell what comes of it."""
-        message: dict[str, Any] = {"kind": "error", "text": "the process that fits has ended: try again"}
+        message: dict[str, Any] | None = None
         assert job.child.stdin is not None and job.child.stdout is not None
         with suppress(OSError, EOFError, ValueError, pickle.UnpicklingError):
             pickle.dump(content, job.child.stdin)
@@ -133,4 +133,7 @@ class FitProcess:
                 message = {"kind": "cancelled"}
             else:
                 self._job = None
+                if message is None:
+                    message = {"kind": "error", "text": "the process that fits has ended: try again"}
+                    self._end()
         job.tell(message)

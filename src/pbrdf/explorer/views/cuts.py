@@ -1,8 +1,8 @@
 """Curves of the models along one line of directions, with the measured points that lie on it.
 
-The line is the viewing angle in the plane of incidence or in any other azimuth, the azimuth at a fixed viewing angle, or
-one along which the data were taken: a fixed source, a fixed viewer, a turning sample, a viewer that follows the source
-(:mod:`pbrdf.report.dataset.cuts`).
+The line is the viewing angle in the plane of incidence or in any other azimuth, the azimuth at a fixed viewing angle,
+or one along which the data were taken: a fixed source, a fixed viewer, a turning sample, a viewer that follows the
+source (:mod:`pbrdf.report.dataset.cuts`).
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ _EVEN, _NEAR = 361, 81
 _GRAZING, _PEAK = 89.0, 4.0
 #: How far a point may be off the line: zenith angles and azimuths, degrees.
 _NEARBY, _NEARBY_AZIMUTH = 0.3, 1.0
+#: Where the mirror direction is on a line, in shares of what is constant there.
 _MIRROR = {"theta_i": 1.0, "theta_r": 1.0, "bistatic": 0.5}
 
 
@@ -64,8 +65,8 @@ def draw(state: State, workspace: Workspace, dragging: bool) -> tuple[dict[str, 
 
     Buffers: the axis, float64 (N,); the curves, float32 (layers, quantities, N); the active model less the one that it
     is compared with, float32 (quantities, N), or nothing; the points' places along the axis, float64 (M,); the points,
-    float64 (quantities, 4, M): measured value, its standard uncertainty, measured − active model in the uncertainties of
-    a fit, and the weight, 1 over these uncertainties. NaN where there is nothing.
+    float64 (quantities, 4, M): measured value, its standard uncertainty, measured − active model in the uncertainties
+    of a fit, and the weight, 1 over these uncertainties. NaN where there is nothing.
     """
     note = ""
     try:
@@ -140,7 +141,7 @@ def line_of(state: State, choice: Choice | None, cuts: ShownCuts) -> Line:
     if along not in ALONG:
         raise StateError("settings.cuts.along", f"curves run along one of {', '.join(ALONG)}")
     if along == "data" and cuts.cuts:
-        return _along_cut(_nearest(settings.get("cut"), cuts.cuts, state.light.theta_i), cuts, state)
+        return _along_cut(_nearest(settings.get("cut"), cuts.cuts, state.light.theta_i), cuts)
     theta_i = state.light.theta_i
     if along == "phi":
         theta_r = number(settings.get("theta_r", theta_i), "settings.cuts.theta_r")
@@ -186,13 +187,11 @@ def _nearest(wish: Any, cuts: Sequence[Cut], theta_i: float) -> Cut:
     return cuts[len(cuts) // 2]
 
 
-def _along_cut(cut: Cut, cuts: ShownCuts, state: State) -> Line:
+def _along_cut(cut: Cut, cuts: ShownCuts) -> Line:
     low, high = float(cut.x.min()), float(cut.x.max())
     if cut.kind == "theta_i":
         low, high = -_GRAZING, _GRAZING
-    mirrors = [cut.constant * _MIRROR[cut.kind]] if cut.kind in _MIRROR else []
-    if cut.kind == "theta_r":
-        mirrors = [abs(cut.constant)]
+    mirrors = [abs(cut.constant) * _MIRROR[cut.kind]] if cut.kind in _MIRROR else []
     x = np.unique(np.concatenate([_with_peak(low, high, mirrors), cut.x]))
     along = replace(cut, path_x=x)
     axis = (

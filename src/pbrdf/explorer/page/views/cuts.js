@@ -58,7 +58,7 @@ function cutRange(values, { logarithmic = false, zero = false, centred = false, 
     high = above * Math.min(...few.filter(s => s * above >= high * 0.9999));
     return low < high ? [low, high] : [low / 2, high * 2];
   }
-  if (centred) { high = Math.max(-low, high, least); low = -high; }
+  if (centred) { high = Math.max(-low, high, least) * 1.05; low = -high; }
   if (zero) low = Math.min(low, 0);
   if (high - low < 1e-9 * Math.max(Math.abs(high), 1)) { low -= 0.5; high += 0.5; }
   const step = evenTicks(low, high)[1] - evenTicks(low, high)[0] || high - low;
@@ -83,7 +83,7 @@ class CutPlot {
   panel(top, height, axis, label, inside) {
     const width = CUT_WIDTH - CUT_LEFT - CUT_RIGHT;
     const grid = drawn("g", { class: "grid" }), words = drawn("g", { class: "words" });
-    for (const tick of axis.ticks(height > 100 ? 5 : 2)) {
+    for (const tick of axis.ticks(height > 100 ? 5 : 3)) {
       const y = top + axis.at(tick);
       grid.append(drawn("line", { x1: CUT_LEFT, x2: CUT_LEFT + width, y1: y, y2: y, class: tick === 0 ? "zero" : "" }));
       words.append(drawn("text", { x: CUT_LEFT - 6, y: y + 4, "text-anchor": "end" }, written(tick, 4)));
@@ -121,7 +121,8 @@ class CutPlot {
     const values = [...curves.flatMap(curve => [...curve]), ...[...measured].filter((_, i) => used(i))];
     const ends = this.range(logarithmic ? "logarithmic" : "linear", cutRange(values, { logarithmic, zero: bright || name === "dolp" }), header.dragging);
     const width = CUT_WIDTH - CUT_LEFT - CUT_RIGHT;
-    this.x = new CutAxis([x[0], x[x.length - 1]], 0, width);
+    const edge = (x[x.length - 1] - x[0]) * 0.02;
+    this.x = new CutAxis([x[0] - edge, x[x.length - 1] + edge], 0, width);
     this.node.replaceChildren();
     const y = new CutAxis(ends, CUT_HEIGHT, 0, logarithmic);
     const inside = header.layers.map((layer, i) => this.path(x, curves[i], y, {
