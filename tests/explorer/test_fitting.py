@@ -102,8 +102,8 @@ def test_displaced_sliders_come_back_within_their_standard_errors(experiment, wh
 def test_points_switched_off_or_held_out_are_not_used(experiment, white):
     """They are spoilt here: a fit that used one would not find the paint."""
     spoilt = experiment.copy(deep=True)
-    spoilt["I"][dict(geometry=slice(0, 5))] *= 30.0
-    spoilt["I"][dict(geometry=slice(42, 63))] *= 1.5  # group 3
+    spoilt["I"][{"geometry": slice(0, 5)}] *= 30.0
+    spoilt["I"][{"geometry": slice(42, 63)}] *= 1.5  # group 3
     workspace = Workspace(datasets=[("white", spoilt)])
     held = {"kind": "group", "values": ["3"]}
     content = content_of(white, data={"off": [0, 1, 2, 3, 4], "held_out": held}, fit={"starts": 1})
