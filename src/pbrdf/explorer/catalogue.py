@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import math
+import re
 from collections.abc import Sequence
 from functools import cache
 from typing import Any
@@ -48,15 +49,16 @@ def catalogue() -> dict[str, Any]:
     """Everything that the page asks for once, as plain JSON."""
     return {
         "version": VERSION,
+        "blank": state_of([]),
         "looks": _looks(),
         "quantities": list(QUANTITIES),
         "parts": list(PARTS),
         "models": {
             name: {
-                "about": (model.__doc__ or "").strip().splitlines()[0],
+                "about": _plain((model.__doc__ or "").strip().splitlines()[0]),
                 "parameters": [_parameter(p) for p in model.parameters],
                 "options": {
-                    key: {"choices": list(choices), "about": choices.description}
+                    key: {"choices": list(choices), "about": _plain(choices.description)}
                     for key, choices in model.options.items()
                 },
             }
@@ -82,6 +84,11 @@ def _parameter(p: Parameter) -> dict[str, Any]:
         "fitted": p.fitted,
         "logarithmic": p.logarithmic,
     }
+
+
+def _plain(text: str) -> str:
+    """A sentence of a docstring without its markup and what it says to readers of the code."""
+    return re.sub(r":\w+:`([^`]*)`", r"\1", text).replace(" (module docstring)", "").replace("``", "")
 
 
 def _looks() -> list[dict[str, Any]]:
