@@ -218,6 +218,7 @@ function switchPoints(app, rows, on) {
 VIEWS.push({
   name: "cuts",
   title: "Curves",
+  wide: true,
   build(place, app) {
     const looks = app.catalogue.looks;
     const set = (edit, options) => app.change(state => edit(state.settings.cuts ??= {}, state), options);
