@@ -6,8 +6,8 @@ PANELS.push({
   build(place, app) {
     const set = edit => app.change(state => edit(state.settings.data ??= {}, state));
     const words = element("p", { class: "about" }, "No measured data are open. Drop a file of data on the page, or start with: pbrdf explore FILE");
-    const inside = element("div", { class: "data", hidden: true });
-    const fault = element("p", { class: "fault", role: "alert", "data-place": "settings.data" });
+    const inside = element("div", { class: "measured", hidden: true });
+    const fault = element("p", { class: "fault", role: "alert" });
     place.append(words, inside, fault);
     let asked = null, described = null, offButton = null;
     const held = new Map();
@@ -71,7 +71,7 @@ PANELS.push({
           held.set(`${kind}=${value}`, box);
           return element("label", { class: "check" }, box, name(value));
         });
-        inside.append(element("fieldset", { class: "held" }, element("legend", {}, title), element("div", { class: "list" }, boxes)));
+        inside.append(element("fieldset", {}, element("legend", {}, title), element("div", { class: "list" }, boxes)));
       }
       offButton = element("button", { type: "button", onclick: () => set(settings => { settings.off = []; }) });
       inside.append(offButton);

@@ -12,12 +12,12 @@ PANELS.push({
     const cancel = element("button", { type: "button", disabled: true, onclick: () => app.send({ type: "cancel_fit" }) }, "Cancel");
     const bar = element("progress", { max: 1, value: 0, "aria-label": "Starts that are done" });
     const status = element("p", { role: "status", class: "about" });
-    const fault = element("p", { class: "fault", role: "alert", "data-place": "settings.fit" });
+    const fault = element("p", { class: "fault", role: "alert" });
     const found = element("div", { class: "found" });
-    place.append(
-      element("fieldset", { class: "held" }, element("legend", {}, "Parameters to fit; the others are held where the sliders stand"), list),
+    place.append(element("div", { class: "fitting" },
+      element("fieldset", {}, element("legend", {}, "Parameters to fit; the others are held where the sliders stand"), list),
       element("div", { class: "field" }, element("label", { for: startsId }, "Starts: the first from the sliders, others spread over the bounds"), starts),
-      element("div", { class: "buttons" }, begin, cancel), bar, status, fault, found);
+      element("div", { class: "buttons" }, begin, cancel), bar, status, fault, found));
     let shown = "", before = null;
     const boxes = new Map();
 

@@ -201,8 +201,8 @@ class CutPlot {
 }
 
 function cutMark(x, y, kind, radius) {
-  if (kind === "off") return drawn("path", { class: "off", d: `M${x - 3} ${y - 3}l6 6m0-6l-6 6` });
-  return drawn("circle", { class: kind, cx: x, cy: y, r: radius });
+  if (kind === "off") return drawn("path", { class: "mark-off", d: `M${x - 3} ${y - 3}l6 6m0-6l-6 6` });
+  return drawn("circle", { class: `mark-${kind}`, cx: x, cy: y, r: radius });
 }
 
 // Switch points of the data off, or on again; they are named by their row in the data set.
@@ -234,7 +234,7 @@ VIEWS.push({
     const angle = element("input", { type: "number", id: angleId, class: "number", step: "any", onchange: () => {
       if (angle.value !== "") set(settings => { settings[settings.along === "phi" ? "theta_r" : "phi"] = Number(angle.value); });
     } });
-    const angleField = element("div", { class: "field" }, angleLabel, angle);
+    const angleField = element("div", { class: "field short" }, angleLabel, angle);
     const check = (text, onchange) => {
       const input = element("input", { type: "checkbox", onchange: () => onchange(input.checked) });
       return { input, node: element("label", { class: "check" }, input, text) };
@@ -245,7 +245,7 @@ VIEWS.push({
       const chosen = cut?.header.cuts[Number(line.value)];
       if (on && chosen?.kind === "theta_i") state.light.theta_i = Math.round(chosen.constant * 1e3) / 1e3;
     }));
-    const legend = element("ul", { class: "legend" });
+    const legend = element("ul", { class: "key" });
     const note = element("p", { class: "fault" });
     const readout = element("p", { class: "readout" });
     const plots = element("div", {
@@ -253,10 +253,10 @@ VIEWS.push({
       "aria-description": "Left and right: along the curve or from point to point. Space: switch the point off or on.",
     });
     const table = element("table"), rows = element("details", { hidden: true }, element("summary", {}), table);
-    place.append(
+    place.append(element("div", { class: "curves" },
       element("div", { class: "line" },
         element("div", { class: "field" }, element("label", { for: lineId }, "Along"), line), angleField, log.node, follow.node),
-      legend, plots, readout, note, rows);
+      legend, plots, readout, note, rows));
     let cut = null, plotted = [], offered = "", pointer = { x: null, point: null };
 
     const settings = () => app.state.settings.cuts ?? {};
@@ -340,9 +340,9 @@ VIEWS.push({
       log.input.checked = settings().logarithmic !== false;
     };
     const describe = header => {
-      const sample = kind => drawn("svg", { viewBox: "0 0 34 14", class: "swatch", "aria-hidden": "true" }, cutMark(17, 7, kind, 4));
+      const sample = kind => drawn("svg", { viewBox: "0 0 34 14", "aria-hidden": "true" }, cutMark(17, 7, kind, 4));
       const entries = header.layers.map(layer => element("li", {},
-        drawn("svg", { viewBox: "0 0 34 14", class: "swatch", "aria-hidden": "true" },
+        drawn("svg", { viewBox: "0 0 34 14", "aria-hidden": "true" },
           drawn("line", { x1: 1, x2: 33, y1: 7, y2: 7, stroke: looks[layer % looks.length].colour, "stroke-width": 2.5, "stroke-dasharray": looks[layer % looks.length].dash.join(" ") })),
         cut.names[layer] + (layer === cut.active && header.layers.length > 1 ? " (active)" : "")));
       if (cut.at.length) entries.push(element("li", {}, sample("used"), `${header.data}, below: larger with more weight`));
