@@ -1,6 +1,8 @@
 // Curves along one line of directions, the measured points on it, and how far they are from the active model.
 
-const CUT_WIDTH = 460, CUT_LEFT = 62, CUT_RIGHT = 12, CUT_TOP = 26, CUT_BOTTOM = 38;
+// Units of the drawing are pixels, as long as it is no narrower or wider than this.
+const CUT_LEAST = 260, CUT_MOST = 640;
+const CUT_LEFT = 58, CUT_RIGHT = 10, CUT_TOP = 26, CUT_BOTTOM = 38;
 // Heights of the curves, the deviations and the difference of two models.
 const CUT_HEIGHT = 196, CUT_LOW = 74, CUT_GAP = 14;
 // Decades below the top that a logarithmic axis reaches, at most.
@@ -35,7 +37,7 @@ class CutAxis {
     if (!this.logarithmic) return evenTicks(this.low, this.high, count);
     const ticks = [], decades = Math.log10(this.high / this.low);
     for (let e = Math.floor(this.start - 1e-9); e <= Math.log10(this.high) + 1e-9; ++e) {
-      for (const step of decades < 2.5 ? [1, 2, 5] : [1]) ticks.push(Number((step * 10 ** e).toPrecision(3)));
+      for (const step of decades < 1.5 ? [1, 2, 5] : [1]) ticks.push(Number((step * 10 ** e).toPrecision(3)));
     }
     return ticks.filter(tick => tick >= this.low * 0.999 && tick <= this.high * 1.001);
   }
@@ -70,6 +72,7 @@ function cutRange(values, { logarithmic = false, zero = false, centred = false, 
 class CutPlot {
   constructor() {
     this.ranges = {};
+    this.whole = CUT_LEAST;
     this.node = drawn("svg", { class: "cut", "aria-hidden": "true" });
   }
 
@@ -81,14 +84,14 @@ class CutPlot {
   }
 
   panel(top, height, axis, label, inside) {
-    const width = CUT_WIDTH - CUT_LEFT - CUT_RIGHT;
+    const width = this.whole - CUT_LEFT - CUT_RIGHT;
     const grid = drawn("g", { class: "grid" }), words = drawn("g", { class: "words" });
     for (const tick of axis.ticks(height > 100 ? 5 : 3)) {
       const y = top + axis.at(tick);
       grid.append(drawn("line", { x1: CUT_LEFT, x2: CUT_LEFT + width, y1: y, y2: y, class: tick === 0 ? "zero" : "" }));
       words.append(drawn("text", { x: CUT_LEFT - 6, y: y + 4, "text-anchor": "end" }, written(tick, 4)));
     }
-    for (const tick of this.x.ticks(6)) {
+    for (const tick of this.x.ticks(width < 300 ? 4 : 6)) {
       const x = CUT_LEFT + this.x.at(tick);
       grid.append(drawn("line", { x1: x, x2: x, y1: top, y2: top + height }));
     }
@@ -120,7 +123,8 @@ class CutPlot {
     const used = i => !header.off[i];
     const values = [...curves.flatMap(curve => [...curve]), ...[...measured].filter((_, i) => used(i))];
     const ends = this.range(logarithmic ? "logarithmic" : "linear", cutRange(values, { logarithmic, zero: bright || name === "dolp" }), header.dragging);
-    const width = CUT_WIDTH - CUT_LEFT - CUT_RIGHT;
+    this.whole = Math.min(Math.max(this.node.clientWidth, CUT_LEAST), CUT_MOST);
+    const width = this.whole - CUT_LEFT - CUT_RIGHT;
     const edge = (x[x.length - 1] - x[0]) * 0.02;
     this.x = new CutAxis([x[0] - edge, x[x.length - 1] + edge], 0, width);
     this.node.replaceChildren();
@@ -167,12 +171,12 @@ class CutPlot {
       top += CUT_LOW;
     }
     const words = drawn("g", { class: "words" });
-    for (const tick of this.x.ticks(6)) words.append(drawn("text", { x: CUT_LEFT + this.x.at(tick), y: top + 15, "text-anchor": "middle" }, written(tick, 4)));
+    for (const tick of this.x.ticks(width < 300 ? 4 : 6)) words.append(drawn("text", { x: CUT_LEFT + this.x.at(tick), y: top + 15, "text-anchor": "middle" }, written(tick, 4)));
     words.append(drawn("text", { x: CUT_LEFT + width / 2, y: top + 31, "text-anchor": "middle", class: "axis" }, header.axis));
     this.cursor = drawn("line", { class: "cursor", y1: CUT_TOP, y2: top });
     this.ring = drawn("circle", { class: "ring", r: 7 });
     this.node.append(words, this.cursor, this.ring);
-    this.node.setAttribute("viewBox", `0 0 ${CUT_WIDTH} ${top + CUT_BOTTOM}`);
+    this.node.setAttribute("viewBox", `0 0 ${this.whole} ${top + CUT_BOTTOM}`);
   }
 
   // Show the cursor; `point` is the index of a point, null for none.
@@ -186,7 +190,7 @@ class CutPlot {
 
   // Where the pointer is in units of the drawing.
   where(event) {
-    const box = this.node.getBoundingClientRect(), scale = CUT_WIDTH / box.width;
+    const box = this.node.getBoundingClientRect(), scale = this.whole / box.width;
     return [(event.clientX - box.left) * scale, (event.clientY - box.top) * scale];
   }
 
@@ -257,7 +261,7 @@ VIEWS.push({
       element("div", { class: "line" },
         element("div", { class: "field" }, element("label", { for: lineId }, "Along"), line), angleField, log.node, follow.node),
       legend, plots, readout, note, rows));
-    let cut = null, plotted = [], offered = "", pointer = { x: null, point: null };
+    let cut = null, plotted = [], drawnAt = 0, offered = "", pointer = { x: null, point: null };
 
     const settings = () => app.state.settings.cuts ?? {};
     // Beside the points or along the curve, in words.
@@ -368,6 +372,15 @@ VIEWS.push({
           return element("tr", {}, element("td", {}, box), [`${written(x, 4)}°`, ...numbers].map(text => element("td", {}, text)));
         })));
     };
+    const redraw = () => {
+      plotted.forEach((plot, k) => plot.draw(cut, k, settings(), looks));
+      drawnAt = plots.clientWidth;
+    };
+    new ResizeObserver(() => {
+      if (!cut || !plotted.length || Math.abs(plots.clientWidth - drawnAt) < 2) return;
+      redraw();
+      move(pointer.x, pointer.point);
+    }).observe(plots);
     rows.addEventListener("toggle", () => { if (cut) list(); });
 
     return {
@@ -384,7 +397,7 @@ VIEWS.push({
         if (header.layers.some(layer => layer >= layers.length)) return;
         while (plotted.length > header.quantities.length) plotted.pop().node.remove();
         while (plotted.length < header.quantities.length) { plotted.push(new CutPlot()); plots.append(plotted[plotted.length - 1].node); }
-        plotted.forEach((plot, k) => plot.draw(cut, k, settings(), looks));
+        redraw();
         offerLines(header);
         plots.setAttribute("aria-valuemin", cut.x[0]);
         plots.setAttribute("aria-valuemax", cut.x[cut.x.length - 1]);
