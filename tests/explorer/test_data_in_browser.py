@@ -92,6 +92,7 @@ def test_points_are_switched_off_by_keyboard_and_a_fit_can_be_undone(served, pag
     told = float(re.search(r"measured ([\d.]+)", said)[1])
     assert np.abs(ds["I"].values - told).min() < 1e-4
     page.keyboard.press("Space")
+    expect(plots).to_have_attribute("aria-valuetext", re.compile("^switched off"), timeout=PATIENCE)
     assert page.locator("svg.cut").first.locator(".mark-off").count() >= 1
     assert page.get_by_role("button", name="Switch 1 point on again").is_enabled()
 
