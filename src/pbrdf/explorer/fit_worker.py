@@ -15,7 +15,10 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from pbrdf.inversion.result import FitResult
+    from pbrdf.models.base import Model
 
 __all__ = ["found_by", "main"]
 
@@ -31,22 +34,40 @@ def found_by(job: dict[str, Any], tell: Callable[[dict[str, Any]], None]) -> dic
     job
         ``dataset``, ``model``, ``starts`` and other arguments of :func:`pbrdf.fit`.
     tell
-        Told how far it is: starts that are done, of how many, and χ² at the minimum next to the model's values.
+        Told how far it is: starts that are done, of how many, and χ² of the model that it begins from.
     """
     from pbrdf.inversion.fit import fit
 
     arguments = dict(job)
-    dataset, model, starts = (arguments.pop(name) for name in ("dataset", "model", "starts"))
-    result = fit(dataset, model, starts=1, **arguments)
-    if starts > 1:
-        here = result.goodness.chi2
+    dataset, model = (arguments.pop(name) for name in ("dataset", "model"))
+    here = _chi2(dataset, model, arguments)
 
-        def progress(done: int, of: int) -> None:
-            tell({"kind": "progress", "done": done, "of": of, "chi2": here})
+    def progress(done: int, of: int) -> None:
+        tell({"kind": "progress", "done": done, "of": of, "chi2": here})
 
-        progress(1, starts)
-        result = fit(dataset, model, starts=starts, progress=progress, **arguments)
-    return _described(result)
+    progress(0, arguments["starts"])
+    return {**_described(fit(dataset, model, progress=progress, **arguments)), "chi2_before": here}
+
+
+def _chi2(dataset: xr.Dataset, model: Model, arguments: dict[str, Any]) -> float | None:
+    """χ² of the model as it is, of the points that are not held out."""
+    import numpy as np
+
+    from pbrdf.inversion.observations import Observations
+    from pbrdf.inversion.problem import predict
+    from pbrdf.inversion.unknowns import space_of
+
+    data = Observations.from_dataset(dataset)
+    if arguments["hold_out"] is not None:
+        data = data.subset(~arguments["hold_out"].mask(dataset))
+    fix, free = arguments["fix"], arguments["free"]
+    space, begin = space_of(model, {}, fix, free, {}, {}, data)
+    modelled = predict(
+        space, space.to_unknowns(np.array([begin[p.name] for p in space.free])), data, data.channels
+    )
+    off = np.stack([modelled[name] for name in data.channels]) - data.values
+    chi2 = float((np.einsum("ijg,jg->ig", data.whitening, off) ** 2).sum())
+    return chi2 if np.isfinite(chi2) else None
 
 
 def _described(result: FitResult) -> dict[str, Any]:

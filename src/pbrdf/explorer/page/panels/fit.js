@@ -18,7 +18,7 @@ PANELS.push({
       element("fieldset", {}, element("legend", {}, "Parameters to fit; the others are held where the sliders stand"), list),
       element("div", { class: "field" }, element("label", { for: startsId }, "Starts: the first from the sliders, others spread over the bounds"), starts),
       element("div", { class: "buttons" }, begin, cancel), bar, status, fault, found));
-    let shown = "", before = null;
+    let shown = "", wanted = 1;
     const boxes = new Map();
 
     const rebuild = model => {
@@ -48,11 +48,14 @@ PANELS.push({
       }
       app.change(state => { Object.assign(state.layers[fit.layer].parameters, fit.values); });
     };
-    app.on("answer:fit_started", () => { run(true); fault.textContent = ""; before = null; status.textContent = "Fitting …"; bar.removeAttribute("value"); });
+    app.on("answer:fit_started", () => { run(true); fault.textContent = ""; wanted = 1; status.textContent = "Fitting …"; bar.removeAttribute("value"); });
     app.on("answer:fit_progress", ({ done, of, chi2 }) => {
+      wanted = Math.max(wanted, of);
       bar.max = of;
       bar.value = done;
-      status.textContent = `${done} of ${of} starts are done; χ² ${written(chi2, 5)} at the minimum next to the sliders`;
+      // the best of a search over some points is refined on all
+      const what = of < wanted ? "the best start is refined on all points" : `${done} of ${of} starts are done`;
+      status.textContent = `χ² of the sliders ${chi2 === null ? "–" : written(chi2, 5)}; ${what}`;
     });
     app.on("answer:fit_cancelled", () => { run(false); status.textContent = "The fit was cancelled."; });
     app.on("answer:error", content => {
@@ -63,7 +66,8 @@ PANELS.push({
     });
     app.on("answer:fitted", fit => {
       run(false);
-      status.textContent = `χ² ${written(fit.chi2, 5)} over ${fit.count} values, from ${fit.starts} ${fit.starts === 1 ? "start" : "starts"}; the sliders stand at the fit. Undo takes them back.`;
+      const before = fit.chi2_before === null ? "" : `${written(fit.chi2_before, 5)} → `;
+      status.textContent = `χ² ${before}${written(fit.chi2, 5)} over ${fit.count} values, from ${fit.starts} ${fit.starts === 1 ? "start" : "starts"}; the sliders stand at the fit. Undo takes them back.`;
       takeOver(fit);
       found.replaceChildren(...describeFit(fit, app, () => takeOver(fit)));
     });

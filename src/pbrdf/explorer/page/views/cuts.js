@@ -23,6 +23,20 @@ function evenTicks(low, high, count = CUT_MANY_TICKS) {
   return ticks;
 }
 
+// Steps that suit angles in degrees.
+function angleTicks(low, high, count) {
+  const step = [1, 2, 5, 10, 15, 30, 45, 60, 90].find(s => (high - low) / s <= count) ?? 180;
+  const ticks = [];
+  for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9; ++k) ticks.push(k * step);
+  return ticks;
+}
+
+// Zero, and a number on either side of it.
+function sideTicks(high) {
+  const power = 10 ** Math.floor(Math.log10(high * 0.85)), side = power * [5, 2, 1].find(s => s * power <= high * 0.85);
+  return [-side, 0, side];
+}
+
 // An axis from numbers to units of the drawing.
 class CutAxis {
   constructor([low, high], from, to, logarithmic = false) {
@@ -34,8 +48,10 @@ class CutAxis {
   at(value) { return this.from + (this.map(value) - this.start) * this.scale; }
   back(place) { return this.start + (place - this.from) / this.scale; }
   ticks(count) {
-    if (!this.logarithmic) return evenTicks(this.low, this.high, count);
-    const ticks = [], decades = Math.log10(this.high / this.low);
+    if (!this.logarithmic && this.low === -this.high && count < 5) return sideTicks(this.high);
+    const decades = Math.log10(this.high / this.low);
+    if (!this.logarithmic || decades < 0.6) return evenTicks(this.low, this.high, count);
+    const ticks = [];
     for (let e = Math.floor(this.start - 1e-9); e <= Math.log10(this.high) + 1e-9; ++e) {
       for (const step of decades < 1.5 ? [1, 2, 5] : [1]) ticks.push(Number((step * 10 ** e).toPrecision(3)));
     }
@@ -91,7 +107,7 @@ class CutPlot {
       grid.append(drawn("line", { x1: CUT_LEFT, x2: CUT_LEFT + width, y1: y, y2: y, class: tick === 0 ? "zero" : "" }));
       words.append(drawn("text", { x: CUT_LEFT - 6, y: y + 4, "text-anchor": "end" }, written(tick, 4)));
     }
-    for (const tick of this.x.ticks(width < 300 ? 4 : 6)) {
+    for (const tick of angleTicks(this.x.low, this.x.high, width < 300 ? 5 : 8)) {
       const x = CUT_LEFT + this.x.at(tick);
       grid.append(drawn("line", { x1: x, x2: x, y1: top, y2: top + height }));
     }
@@ -154,7 +170,9 @@ class CutPlot {
       top += CUT_GAP + CUT_TOP / 2;
       const shown = [...deviation].filter((_, i) => used(i));
       const axis = new CutAxis(this.range("deviation", cutRange(shown, { centred: true, least: 3 }), header.dragging), CUT_LOW, 0);
-      const band = drawn("rect", { x: 0, width, y: axis.at(1), height: axis.at(-1) - axis.at(1), class: "band" });
+      const band = low.length
+        ? drawn("rect", { x: 0, width, y: axis.at(1), height: axis.at(-1) - axis.at(1), class: "band" })
+        : drawn("text", { x: width / 2, y: CUT_LOW / 2 - 6, "text-anchor": "middle" }, "not measured");
       const marks = low.map(([place, value, kind, radius, i]) => {
         const height = Math.min(Math.max(axis.at(value), 2), CUT_LOW - 2);
         this.marks[i] ??= [CUT_LEFT + place, top + height];
@@ -171,7 +189,7 @@ class CutPlot {
       top += CUT_LOW;
     }
     const words = drawn("g", { class: "words" });
-    for (const tick of this.x.ticks(width < 300 ? 4 : 6)) words.append(drawn("text", { x: CUT_LEFT + this.x.at(tick), y: top + 15, "text-anchor": "middle" }, written(tick, 4)));
+    for (const tick of angleTicks(this.x.low, this.x.high, width < 300 ? 5 : 8)) words.append(drawn("text", { x: CUT_LEFT + this.x.at(tick), y: top + 15, "text-anchor": "middle" }, written(tick, 4)));
     words.append(drawn("text", { x: CUT_LEFT + width / 2, y: top + 31, "text-anchor": "middle", class: "axis" }, header.axis));
     this.cursor = drawn("line", { class: "cursor", y1: CUT_TOP, y2: top });
     this.ring = drawn("circle", { class: "ring", r: 7 });
