@@ -11,6 +11,7 @@ import pytest
 
 import pbrdf
 from pbrdf.explorer.catalogue import layer_of, state_of
+from pbrdf.explorer.fit_process import process_of
 from pbrdf.explorer.fit_worker import found_by
 from pbrdf.explorer.fitting import job_of
 from pbrdf.explorer.session import Session
@@ -156,7 +157,7 @@ def test_a_fit_runs_beside_and_cancelling_ends_its_process(page, displaced, whit
     found = page.ask("fit", content, "fitted", "error")
     assert found["type"] == "fitted" and found["layer"] == 0 and found["model"] == white.name
     assert abs(found["values"]["sigma"] - white.values["sigma"]) < 5e-4
-    fitting = page.session.workspace.fitting
+    fitting = process_of(page.session.workspace)
     first = fitting.pid
     assert not fitting.busy and runs(first)
     # errors of the fit itself come in its own words
@@ -197,16 +198,16 @@ def test_no_process_outlives_its_server():
 
 def test_a_process_that_ended_is_said_to_have_and_replaced(experiment, white):
     workspace = Workspace(datasets=[("white", experiment)])
-    workspace.fitting.warm()
-    first = workspace.fitting.pid
+    process_of(workspace).warm()
+    first = process_of(workspace).pid
     heard, end = [], threading.Event()
     job = job_of(read_state(content_of(white)), workspace)
-    workspace.fitting.start(job, lambda message: (heard.append(message), end.set()))
-    workspace.fitting._child.kill()
+    process_of(workspace).start(job, lambda message: (heard.append(message), end.set()))
+    process_of(workspace)._child.kill()
     assert end.wait(30)
     assert heard[-1]["kind"] == "error" and "has ended" in heard[-1]["text"]
-    workspace.fitting.warm()
-    assert workspace.fitting.pid != first
+    process_of(workspace).warm()
+    assert process_of(workspace).pid != first
     workspace.close()
-    workspace.fitting.warm()
-    assert workspace.fitting.pid is None  # a closed page starts nothing
+    process_of(workspace).warm()
+    assert process_of(workspace).pid is None  # a closed page starts nothing

@@ -7,6 +7,7 @@ import xarray as xr
 import pbrdf
 from pbrdf.data import make_dataset
 from pbrdf.explorer.catalogue import layer_of, state_of
+from pbrdf.explorer.fit_process import process_of
 from pbrdf.explorer.points import Measured, answer, chosen_data
 from pbrdf.explorer.state import StateError, read_state
 from pbrdf.explorer.workspace import Workspace
@@ -120,4 +121,4 @@ def test_page_is_told_what_there_is(experiment, white):
     empty = Workspace()
     answer({"type": "data"}, [], empty, lambda *given: said.append(given[0]))
     assert said[1]["sets"] == [] and said[1]["chosen"] is None
-    assert empty.fitting.pid is None  # no process for those who have nothing to fit
+    assert process_of(empty).pid is None  # no process for those who have nothing to fit

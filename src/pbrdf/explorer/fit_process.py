@@ -14,16 +14,27 @@ import threading
 from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
+from weakref import WeakKeyDictionary
 
 from pbrdf.errors import FitError
+from pbrdf.explorer.workspace import Workspace
 
-__all__ = ["FitProcess"]
+__all__ = ["FitProcess", "process_of"]
 
 _PROGRAM = "pbrdf.explorer.fit_worker"
 #: Windows' word for a low priority; the program lowers its own elsewhere.
 _LOW = getattr(subprocess, "BELOW_NORMAL_PRIORITY_CLASS", 0)
 
 Tell = Callable[[dict[str, Any]], None]
+_processes: WeakKeyDictionary[Workspace, FitProcess] = WeakKeyDictionary()
+
+
+def process_of(workspace: Workspace) -> FitProcess:
+    """The process of a page, which ends with it; it is not started yet."""
+    if workspace not in _processes:
+        _processes[workspace] = FitProcess()
+        workspace.at_close.append(_processes[workspace].close)
+    return _processes[workspace]
 
 
 class _Job:

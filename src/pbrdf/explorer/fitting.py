@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from pbrdf.explorer.fit_process import process_of
 from pbrdf.explorer.points import chosen_data
 from pbrdf.explorer.session import Emit
 from pbrdf.explorer.state import State, StateError, read_state
@@ -28,8 +29,9 @@ def answer(request: dict[str, Any], buffers: Any, workspace: Workspace, emit: Em
         If there is nothing to fit or to cancel, or another fit is running.
     """
     number = request.get("id")
+    process = process_of(workspace)
     if request["type"] == "cancel_fit":
-        if not workspace.fitting.cancel():
+        if not process.cancel():
             raise StateError(_PLACE, "no fit is running")
         return
     state = read_state(request.get("state"))
@@ -45,10 +47,10 @@ def answer(request: dict[str, Any], buffers: Any, workspace: Workspace, emit: Em
         else:
             emit({"type": f"fit_{kind}", "id": number, **message}, [])
 
-    if workspace.fitting.busy:
+    if process.busy:
         raise StateError(_PLACE, "a fit is running: wait for it, or cancel it")
     emit({"type": "fit_started", "id": number}, [])
-    workspace.fitting.start(job, tell)
+    process.start(job, tell)
 
 
 def job_of(state: State, workspace: Workspace) -> dict[str, Any]:

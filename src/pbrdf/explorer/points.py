@@ -9,13 +9,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from pbrdf.data.origin import of_rows
 from pbrdf.errors import PbrdfError
+from pbrdf.explorer.fit_process import process_of
 from pbrdf.explorer.session import Emit
 from pbrdf.explorer.state import State, StateError, number, read_state
+from pbrdf.explorer.workspace import Workspace
 from pbrdf.inversion.holdout import HoldOut
 from pbrdf.inversion.observations import Observations, noise_in_words
 from pbrdf.optics.stokes import dolp
@@ -24,8 +27,6 @@ from pbrdf.report.dataset.quantities import Channel, polarised_quantities, quant
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from pbrdf.explorer.workspace import Workspace
 
 __all__ = [
     "Choice",
@@ -44,6 +45,8 @@ _FIRST_COLUMN = {"Q/I": "m10", "U/I": "m20", "V/I": "m30"}
 _MOST_LISTED = 200
 #: Half the width within which a wavelength is the chosen one, nm.
 _WAVELENGTH_TOLERANCE = 0.5
+#: Points that a page has shown, by data set and wavelength.
+_measured: WeakKeyDictionary[Workspace, dict[Any, Measured]] = WeakKeyDictionary()
 
 
 def label_of(quantity: str) -> str:
@@ -258,9 +261,10 @@ def chosen_data(state: State, workspace: Workspace) -> Choice | None:
             raise StateError(
                 "settings.data.wavelength", f"{wavelength:g} nm was not measured; there are {listed}"
             )
-    measured = workspace.measured.get((name, wavelength))
+    known = _measured.setdefault(workspace, {})
+    measured = known.get((name, wavelength))
     if measured is None or measured.whole is not whole:
-        measured = workspace.measured[name, wavelength] = Measured.of(name, whole, wavelength)
+        measured = known[name, wavelength] = Measured.of(name, whole, wavelength)
     return Choice(
         measured,
         np.isin(measured.rows, _rows(settings.get("off", []), whole.sizes["geometry"])),
@@ -307,5 +311,5 @@ def answer(request: dict[str, Any], buffers: Any, workspace: Workspace, emit: Em
         chosen = chosen_data(read_state(request.get("state")), workspace)
         assert chosen is not None
         content["chosen"] = chosen.measured.summary()
-        workspace.fitting.warm()  # a fit may come
+        process_of(workspace).warm()  # a fit may come
     emit(content, [])
