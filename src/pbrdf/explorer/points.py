@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 from weakref import WeakKeyDictionary
 
@@ -22,8 +23,10 @@ from pbrdf.explorer.workspace import Workspace
 from pbrdf.inversion.holdout import HoldOut
 from pbrdf.inversion.observations import Observations, noise_in_words
 from pbrdf.optics.stokes import dolp
+from pbrdf.report.dataset.cuts import in_plane_cuts
 from pbrdf.report.dataset.points import Points, dolp_uncertainty, error_correlation, ratio_dolp
 from pbrdf.report.dataset.quantities import Channel, polarised_quantities, quantity_label
+from pbrdf.report.dataset.shown_cuts import ShownCuts
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -118,6 +121,12 @@ class Measured:
             _spread(dataset, observations),
             noise_in_words(None, observations),
         )
+
+    @cached_property
+    def cuts(self) -> ShownCuts:
+        """Lines in the plane of incidence along which the data were taken; none where they are on no few."""
+        found = in_plane_cuts(self.points)
+        return ShownCuts(found, [], len(found))
 
     @property
     def light(self) -> tuple[float, ...]:

@@ -19,7 +19,7 @@ from pbrdf.explorer.workspace import Workspace
 from pbrdf.models.base import Model
 from pbrdf.optics.angles import within_half_turn
 from pbrdf.optics.stokes import STOKES
-from pbrdf.report.dataset.cuts import Cut, in_plane_cuts
+from pbrdf.report.dataset.cuts import Cut
 from pbrdf.report.dataset.quantities import is_element
 from pbrdf.report.dataset.shown_cuts import ShownCuts
 
@@ -73,20 +73,29 @@ def draw(state: State, workspace: Workspace, dragging: bool) -> tuple[dict[str, 
         choice = chosen_data(state, workspace)
     except StateError as error:
         choice, note = None, str(error)
-    cuts = _cuts(choice)
+    cuts = ShownCuts([], [], 0) if choice is None else choice.measured.cuts
     line = line_of(state, choice, cuts)
     accuracy = "fast" if dragging else "default"
-    light = state.light.stokes
     shown = [i for i, layer in enumerate(state.layers) if layer.shown]
     wanted = {*shown, state.active, *(() if state.compare is None else (state.compare,))}
+    size, angles, light = len(line.x), line.angles, np.asarray(state.light.stokes)
     curves = {
-        i: _curves(state.layers[i].model.with_accuracy(accuracy), state, line.angles, light) for i in wanted
+        i: _curves(state.layers[i].model.with_accuracy(accuracy), state, angles, light)
+        for i in wanted - {state.active}
     }
-    points = np.full((len(state.quantities), 4, len(line.rows)), np.nan)
     if choice is not None and line.rows.size:
-        points = _points(state, choice, line, accuracy)
+        # the active model at the points, too, in the light in which they were measured
+        ds = choice.measured.dataset
+        there = (ds[name].values[line.rows] for name in ("theta_i", "theta_r", "phi"))
+        angles = tuple(np.concatenate(pair) for pair in zip(angles, there, strict=True))  # type: ignore[assignment]
         if not np.allclose(choice.measured.light, light, atol=1e-6):
             note = "The points were measured in other light than the curves are drawn for."
+            light = np.where(np.arange(len(angles[0]))[:, None] < size, light, choice.measured.light)
+        elif state.part != "total":
+            note = f"The deviations of the points are those from the {state.part} part alone."
+    both = _curves(state.shown.model.with_accuracy(accuracy), state, angles, light)
+    curves[state.active] = both[:, :size]
+    points = _points(state, choice, line, both[:, size:])
     if "aolp" in state.quantities:
         _continuous(curves, points, state, line)
     difference = np.empty((0,))
@@ -120,12 +129,6 @@ def draw(state: State, workspace: Workspace, dragging: bool) -> tuple[dict[str, 
         line.at.astype("<f8").tobytes(),
         points.astype("<f8").tobytes(),
     ]
-
-
-def _cuts(choice: Choice | None) -> ShownCuts:
-    """All lines in the plane of incidence along which the data were taken."""
-    found = [] if choice is None else in_plane_cuts(choice.measured.points)
-    return ShownCuts(found, [], len(found))
 
 
 def line_of(state: State, choice: Choice | None, cuts: ShownCuts) -> Line:
@@ -248,7 +251,7 @@ def _curves(
     model: Model,
     state: State,
     angles: tuple[np.ndarray, np.ndarray, np.ndarray],
-    light: Sequence[float],
+    light: np.ndarray,
 ) -> np.ndarray:
     """The quantities of a model, shape (quantities, N)."""
     values: dict[str, np.ndarray] = {}
@@ -262,16 +265,12 @@ def _curves(
     return np.array([modelled(elements if is_element(q) else values, q) for q in state.quantities])
 
 
-def _points(state: State, choice: Choice, line: Line, accuracy: str) -> np.ndarray:
-    """Measured value, uncertainty, deviation from the active model and weight, shape (quantities, 4, M)."""
-    measured, rows = choice.measured, line.rows
-    ds = measured.dataset
-    angles = tuple(ds[name].values[rows] for name in ("theta_i", "theta_r", "phi"))
-    model = state.shown.model.with_accuracy(accuracy)
-    expected = _curves(model, state, angles, measured.light)  # type: ignore[arg-type]
+def _points(state: State, choice: Choice | None, line: Line, expected: np.ndarray) -> np.ndarray:
+    """Measured value, uncertainty, deviation from what is expected and weight, shape (quantities, 4, M)."""
+    rows = line.rows
     found = np.full((len(state.quantities), 4, len(rows)), np.nan)
     for k, quantity in enumerate(state.quantities):
-        if (known := measured.channel(quantity)) is None:
+        if choice is None or (known := choice.measured.channel(quantity)) is None:
             continue
         channel, spread = known
         value, weigh = channel.measured[rows], spread[rows]

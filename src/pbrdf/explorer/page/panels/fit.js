@@ -1,3 +1,6 @@
+// χ², which may be far from 1.
+const chiSquare = value => value === null ? "–" : value < 1e6 ? written(value, 5) : value.toExponential(3).replace("e+", "e");
+
 // The fit of the active model, from where its sliders stand.
 
 PANELS.push({
@@ -55,7 +58,7 @@ PANELS.push({
       bar.value = done;
       // the best of a search over some points is refined on all
       const what = of < wanted ? "the best start is refined on all points" : `${done} of ${of} starts are done`;
-      status.textContent = `χ² of the sliders ${chi2 === null ? "–" : written(chi2, 5)}; ${what}`;
+      status.textContent = `χ² of the sliders ${chiSquare(chi2)}; ${what}`;
     });
     app.on("answer:fit_cancelled", () => { run(false); status.textContent = "The fit was cancelled."; });
     app.on("answer:error", content => {
@@ -66,8 +69,8 @@ PANELS.push({
     });
     app.on("answer:fitted", fit => {
       run(false);
-      const before = fit.chi2_before === null ? "" : `${written(fit.chi2_before, 5)} → `;
-      status.textContent = `χ² ${before}${written(fit.chi2, 5)} over ${fit.count} values, from ${fit.starts} ${fit.starts === 1 ? "start" : "starts"}; the sliders stand at the fit. Undo takes them back.`;
+      const before = fit.chi2_before === null ? "" : `${chiSquare(fit.chi2_before)} → `;
+      status.textContent = `χ² ${before}${chiSquare(fit.chi2)} over ${fit.count} values, from ${fit.starts} ${fit.starts === 1 ? "start" : "starts"}; the sliders stand at the fit. Undo takes them back.`;
       takeOver(fit);
       found.replaceChildren(...describeFit(fit, app, () => takeOver(fit)));
     });
@@ -97,7 +100,7 @@ function describeFit(fit, app, take) {
       element("thead", {}, row("th", ["", "value", "the data say"])),
       element("tbody", {}, fit.estimates.map(e => row("td", [e.symbol, e.written + unit(e), e.verdict])))),
     element("dl", {}, [
-      ["χ² / degrees of freedom", `${written(fit.chi2, 5)} / ${fit.freedom}${fit.reduced_chi2 === null ? "" : ` = ${written(fit.reduced_chi2, 3)}`}`],
+      ["χ² / degrees of freedom", `${chiSquare(fit.chi2)} / ${fit.freedom}${fit.reduced_chi2 === null ? "" : ` = ${written(fit.reduced_chi2, 3)}`}`],
       ["Uncertainties", fit.noise],
       fit.fitted && errors("Errors, fitted", fit.fitted),
       fit.predicted && errors(`Errors, held out: ${fit.held_out}`, fit.predicted),
