@@ -163,10 +163,14 @@ def line_of(state: State, choice: Choice | None, cuts: ShownCuts) -> Line:
     if not -180.0 <= phi <= 180.0:
         raise StateError("settings.cuts.phi", "the azimuth is within −180 … 180 degrees")
     x = _with_peak(-_GRAZING, _GRAZING, [theta_i if abs(phi) < 90.0 else -theta_i])
-    where = "plane of incidence" if phi == 0.0 else f"φ = {phi:.4g}°"
+    where, beyond = (
+        ("plane of incidence", "on the source's side")
+        if phi == 0.0
+        else (f"φ = {phi:.4g}°", "beyond the normal")
+    )
     line = Line(
         f"θi = {theta_i:.4g}°, {where}".replace("-", "−"),
-        "viewing angle θr (°), negative on the other side of the normal",
+        f"viewing angle θr (°), − {beyond}",
         x,
         _radians(theta_i, np.abs(x), np.where(x < 0.0, phi + 180.0, phi)),
         *_no_points(),
@@ -198,9 +202,7 @@ def _along_cut(cut: Cut, cuts: ShownCuts) -> Line:
     x = np.unique(np.concatenate([_with_peak(low, high, mirrors), cut.x]))
     along = replace(cut, path_x=x)
     axis = (
-        "angle of incidence θi (°)"
-        if cut.over_incidence
-        else "viewing angle θr (°), negative on the source's side"
+        "angle of incidence θi (°)" if cut.over_incidence else "viewing angle θr (°), − on the source's side"
     )
     return Line(cuts.label(cut), axis, x, along.path_angles(), cut.rows, cut.x)
 

@@ -85,7 +85,12 @@ PANELS.push({
       offButton.textContent = off.length ? `Switch ${off.length} ${off.length === 1 ? "point" : "points"} on again` : "All points are switched on";
     };
     app.on("answer:data", content => { fault.textContent = ""; build(content); });
-    app.on("answer:opened", () => { if (app.state) ask(); });
+    // what has just been opened is shown
+    app.on("answer:opened", ({ datasets }) => {
+      if (!app.state || !datasets?.length) return;
+      asked = null;
+      app.change(state => { state.settings.data = { set: datasets[0] }; });
+    });
     app.on("answer:error", content => { if (content.about === "data") fault.textContent = content.text; });
     return {
       update(state) {

@@ -178,7 +178,7 @@ class CutPlot {
         this.marks[i] ??= [CUT_LEFT + place, top + height];
         return cutMark(place, height, kind, radius);
       });
-      this.panel(top, CUT_LOW, axis, "(measured − model) / standard deviation", [band, ...marks]);
+      this.panel(top, CUT_LOW, axis, "measured − model, in standard deviations", [band, ...marks]);
       top += CUT_LOW;
     }
     if (cut.difference.length) {
