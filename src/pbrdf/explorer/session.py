@@ -27,6 +27,7 @@ Emit = Callable[[Mapping[str, Any], Sequence[bytes | memoryview]], None]
 #: Modules of the views by name; each has ``draw(state, workspace, dragging)`` that gives a header and buffers.
 VIEWS = {
     "hemisphere": "pbrdf.explorer.views.hemisphere",
+    "cuts": "pbrdf.explorer.views.cuts",
     "mueller": "pbrdf.explorer.views.mueller",
     "sphere": "pbrdf.explorer.views.sphere",
     "polar": "pbrdf.explorer.views.polar",
@@ -34,7 +35,10 @@ VIEWS = {
 #: Modules that answer the other requests, by the request's type; each has
 #: ``answer(request, buffers, workspace, emit)``.
 REQUESTS: dict[str, str] = {
+    "cancel_fit": "pbrdf.explorer.fitting",
+    "data": "pbrdf.explorer.points",
     "export": "pbrdf.explorer.exports",
+    "fit": "pbrdf.explorer.fitting",
     "open": "pbrdf.explorer.uploads",
     "previews": "pbrdf.explorer.previews",
     "read_state": "pbrdf.explorer.reading",
