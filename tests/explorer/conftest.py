@@ -1,6 +1,7 @@
 """An explorer served in a thread, and Chromium to open it in."""
 
 import asyncio
+import concurrent.futures
 import threading
 
 import pytest
@@ -48,6 +49,17 @@ def served():
     for loop, task, thread in running:
         loop.call_soon_threadsafe(task.cancel)
         thread.join(10)
+
+
+@pytest.fixture
+def apart():
+    """A function that calls another in a thread of its own: where Playwright is at work, its loop runs in this one."""
+
+    def call(function, *arguments):
+        with concurrent.futures.ThreadPoolExecutor(1) as pool:
+            return pool.submit(function, *arguments).result(60)
+
+    return call
 
 
 @pytest.fixture(scope="session")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import math
+import re
 from collections.abc import Sequence
 from functools import cache
 from typing import Any
@@ -11,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from pbrdf.data.paints import PAINTS, load_paint
-from pbrdf.explorer.state import QUANTITIES, VERSION
+from pbrdf.explorer.state import MOST_LAYERS, QUANTITIES, VERSION
 from pbrdf.models.base import PARTS, Model
 from pbrdf.models.parameters import Parameter
 from pbrdf.models.registry import MODELS
@@ -20,6 +21,8 @@ __all__ = ["catalogue", "layer_of", "state_of"]
 
 #: Colour tables by what they are for, Matplotlib's names: even steps look even, also to the colour-blind.
 COLOURS = {"sequential": "cividis", "signed": "RdBu_r", "cyclic": "twilight"}
+#: Lengths of strokes and gaps of the lines of :mod:`pbrdf.report.together.curves`, in their order; none for no gaps.
+_DASHES: tuple[tuple[float, ...], ...] = ((), (7.0, 3.0), (7.0, 2.5, 1.5, 2.5), (1.5, 2.5))
 
 
 def layer_of(name: str, model: Model) -> dict[str, Any]:
@@ -46,14 +49,16 @@ def catalogue() -> dict[str, Any]:
     """Everything that the page asks for once, as plain JSON."""
     return {
         "version": VERSION,
+        "blank": state_of([]),
+        "looks": _looks(),
         "quantities": list(QUANTITIES),
         "parts": list(PARTS),
         "models": {
             name: {
-                "about": (model.__doc__ or "").strip().splitlines()[0],
+                "about": _plain((model.__doc__ or "").strip().splitlines()[0]),
                 "parameters": [_parameter(p) for p in model.parameters],
                 "options": {
-                    key: {"choices": list(choices), "about": choices.description}
+                    key: {"choices": list(choices), "about": _plain(choices.description)}
                     for key, choices in model.options.items()
                 },
             }
@@ -79,6 +84,21 @@ def _parameter(p: Parameter) -> dict[str, Any]:
         "fitted": p.fitted,
         "logarithmic": p.logarithmic,
     }
+
+
+def _plain(text: str) -> str:
+    """A sentence of a docstring without its markup and what it says to readers of the code."""
+    return re.sub(r":\w+:`([^`]*)`", r"\1", text).replace(" (module docstring)", "").replace("``", "")
+
+
+def _looks() -> list[dict[str, Any]]:
+    """Colour, marker and dashes of each layer, those of pbrdf's figures of several models."""
+    from pbrdf.report.style import looks_of
+
+    return [
+        {"colour": look.colour, "marker": look.marker, "dash": _DASHES[i % len(_DASHES)]}
+        for i, look in enumerate(looks_of(MOST_LAYERS))
+    ]
 
 
 def _table(name: str) -> str:

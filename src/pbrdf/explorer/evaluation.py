@@ -27,7 +27,7 @@ from pbrdf.explorer.state import State
 from pbrdf.models.base import Model
 from pbrdf.models.evaluation import kernel_from_angles
 
-__all__ = ["Grid", "Picture", "described", "fields", "prepare"]
+__all__ = ["Grid", "Picture", "described", "fields", "mueller_matrix", "prepare"]
 
 #: Radiance of unit irradiance and m00, 1/sr, below which there is no light: its logarithm ends and ratios are 0.
 DARK = 1e-20
@@ -81,18 +81,39 @@ def _angles(grid: Grid, Float: Any) -> tuple[Any, Any]:
     return theta_r, phi
 
 
-def _matrix(model: Model, theta_i: float, grid: Grid, part: str, whole: bool) -> list[list[Any]]:
-    """Mueller matrix over a grid, evaluated; only its first column unless the `whole` is asked for."""
+def mueller_matrix(
+    model: Model, theta_i: Any, theta_r: Any, phi: Any, part: str, whole: bool
+) -> list[list[Any]]:
+    """Mueller matrix in directions that are Dr.Jit Float32 in radians, evaluated.
+
+    Parameters
+    ----------
+    model
+        With plain numbers as parameters.
+    theta_i, theta_r, phi
+        Directions; one that is the same for all is a number.
+    part
+        Part of the model.
+    whole
+        Without it only the first column, which is all that natural light needs.
+
+    Returns
+    -------
+    list of list
+        Rows of Dr.Jit Float32; what is 0 by the model's structure has one entry.
+    """
     import drjit as dr
 
     Float = get_backend().Float32
-    theta_r, phi = _angles(grid, Float)
+    theta_i, theta_r, phi = (
+        dr.opaque(Float, x) if isinstance(x, float) else x for x in (theta_i, theta_r, phi)
+    )
     # as in models/evaluation.py: an extinction of 0 has a kernel of its own, which is faster
     absent = {p.name for p in model.parameters if p.vanishing and not model.values[p.name]}
     values = {
         name: None if name in absent else dr.opaque(Float, value) for name, value in model.values.items()
     }
-    f = kernel_from_angles(model, dr.opaque(Float, theta_i), theta_r, phi, values, part)
+    f = kernel_from_angles(model, theta_i, theta_r, phi, values, part)
     columns = 4 if whole else 1
     # what is 0 by the model's structure is as long as the rest: one kernel for all that follows
     matrix = [[Float(x) for x in row[:columns]] for row in f]
@@ -189,10 +210,9 @@ def fields(
     if state.compare is not None:
         models.append(state.layers[state.compare].model)
     accuracy = "fast" if dragging else "default"
+    directions = (math.radians(state.light.theta_i), *_angles(grid, Float))
     matrices = [
-        _matrix(
-            model.with_accuracy(accuracy), math.radians(state.light.theta_i), grid, state.part, not natural
-        )
+        mueller_matrix(model.with_accuracy(accuracy), *directions, state.part, not natural)
         for model in models
     ]
     light = [dr.opaque(Float, x) for x in (s[:1] if natural else s)]

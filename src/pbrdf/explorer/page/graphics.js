@@ -15,6 +15,7 @@ class Graphics {
       gl.attachShader(this.program, shader);
     }
     gl.linkProgram(this.program);
+    if (!gl.getProgramParameter(this.program, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(this.program));
     gl.useProgram(this.program);
     this.textures = new Map();
     this.places = new Map();
