@@ -163,11 +163,9 @@ def line_of(state: State, choice: Choice | None, cuts: ShownCuts) -> Line:
     if not -180.0 <= phi <= 180.0:
         raise StateError("settings.cuts.phi", "the azimuth is within −180 … 180 degrees")
     x = _with_peak(-_GRAZING, _GRAZING, [theta_i if abs(phi) < 90.0 else -theta_i])
-    where, beyond = (
-        ("plane of incidence", "on the source's side")
-        if phi == 0.0
-        else (f"φ = {phi:.4g}°", "beyond the normal")
-    )
+    where, beyond = "plane of incidence", "on the source's side"
+    if phi != 0.0:
+        where, beyond = f"φ = {phi:.4g}°", "beyond the normal"
     line = Line(
         f"θi = {theta_i:.4g}°, {where}".replace("-", "−"),
         f"viewing angle θr (°), − {beyond}",

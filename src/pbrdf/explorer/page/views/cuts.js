@@ -292,7 +292,7 @@ VIEWS.push({
       const parts = header.quantities.map(({ label }, k) => {
         const models = header.layers.map((layer, i) => [cut.names[layer], curves[(i * many + k) * size + index]])
           .filter(([, value]) => Number.isFinite(value)).map(([name, value]) => `${name} ${written(value, 4)}`);
-        if (point === null) return `${label}: ${models.join(", ")}`;
+        if (point === null) return `${label}: ${models.join(", ") || "none"}`;
         const [measured, std, deviation, weight] = [0, 1, 2, 3].map(j => points[(4 * k + j) * at.length + point]);
         if (!Number.isFinite(measured)) return `${label}: not measured`;
         const bar = std > 0 ? ` ± ${written(std, 2)}` : "";
