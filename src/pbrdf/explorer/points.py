@@ -145,7 +145,7 @@ class Measured:
 
     def summary(self) -> dict[str, Any]:
         """What the page says of the data set."""
-        groups = list(dict.fromkeys(self.points.group))
+        groups = sorted({str(g) for g in self.points.group}, key=lambda g: (not g.isdigit(), g.zfill(20)))
         incidences = np.unique(np.round(self.points.theta_i, 1))
         wavelengths = known_wavelengths(self.whole)
         named = {"intensity": "intensity", "dolp": "DoLP", "aolp": "AoLP"}

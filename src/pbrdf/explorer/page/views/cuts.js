@@ -116,11 +116,13 @@ class CutPlot {
     this.node.append(grid, words, drawn("svg", { x: CUT_LEFT, y: top, width, height, viewBox: `0 0 ${width} ${height}` }, ...inside));
   }
 
-  path(xs, ys, axis, attributes) {
+  // A line through values; one of angles that are the same after half a turn ends where it leaves their range.
+  path(xs, ys, axis, attributes, turning = false) {
     let d = "", pen = "M";
     for (let i = 0; i < xs.length; ++i) {
       const value = ys[i];
       if (!Number.isFinite(value) || (axis.logarithmic && value <= 0)) { pen = "M"; continue; }
+      if (turning && Math.abs(value - ys[i - 1]) > 90) pen = "M";
       d += `${pen}${this.x.at(xs[i]).toFixed(1)} ${Math.min(Math.max(axis.at(value), -1e4), 1e4).toFixed(1)}`;
       pen = "L";
     }
@@ -147,7 +149,7 @@ class CutPlot {
     const y = new CutAxis(ends, CUT_HEIGHT, 0, logarithmic);
     const inside = header.layers.map((layer, i) => this.path(x, curves[i], y, {
       stroke: looks[layer % looks.length].colour, "stroke-width": layer === cut.active ? 2.4 : 1.5, "stroke-dasharray": looks[layer % looks.length].dash.join(" "),
-    }));
+    }, name === "aolp"));
     this.marks = [];
     const low = [];
     const heaviest = Math.max(...[...weight].filter(Number.isFinite), 0);
@@ -185,7 +187,7 @@ class CutPlot {
       top += CUT_GAP + CUT_TOP / 2;
       const curve = cut.difference.subarray(k * size, (k + 1) * size);
       const axis = new CutAxis(this.range("difference", cutRange(curve, { centred: true, least: 1e-6 }), header.dragging), CUT_LOW, 0);
-      this.panel(top, CUT_LOW, axis, `difference: ${cut.names[cut.active]} − ${cut.names[cut.compare]}`, [this.path(x, curve, axis, { class: "difference" })]);
+      this.panel(top, CUT_LOW, axis, `difference: ${cut.names[cut.active]} − ${cut.names[cut.compare]}`, [this.path(x, curve, axis, { class: "difference" }, name === "aolp")]);
       top += CUT_LOW;
     }
     const words = drawn("g", { class: "words" });
