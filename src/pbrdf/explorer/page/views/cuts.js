@@ -186,7 +186,7 @@ class CutPlot {
     if (cut.difference.length) {
       top += CUT_GAP + CUT_TOP / 2;
       const curve = cut.difference.subarray(k * size, (k + 1) * size);
-      const axis = new CutAxis(this.range("difference", cutRange(curve, { centred: true, least: 1e-6 }), header.dragging), CUT_LOW, 0);
+      const axis = new CutAxis(this.range("difference", cutRange(curve, { centred: true, least: 1e-3 }), header.dragging), CUT_LOW, 0);
       this.panel(top, CUT_LOW, axis, `difference: ${cut.names[cut.active]} − ${cut.names[cut.compare]}`, [this.path(x, curve, axis, { class: "difference" }, name === "aolp")]);
       top += CUT_LOW;
     }
@@ -270,7 +270,7 @@ VIEWS.push({
       if (on && chosen?.kind === "theta_i") state.light.theta_i = Math.round(chosen.constant * 1e3) / 1e3;
     }));
     const legend = element("ul", { class: "key" });
-    const note = element("p", { class: "fault" });
+    const note = element("p", { class: "about", role: "status" });
     const readout = element("p", { class: "readout" });
     const plots = element("div", {
       class: "plots", tabindex: 0, role: "slider", "aria-label": "Place along the curves",
