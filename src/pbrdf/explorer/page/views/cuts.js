@@ -229,6 +229,9 @@ function cutMark(x, y, kind, radius) {
   return drawn("circle", { class: `mark-${kind}`, cx: x, cy: y, r: radius });
 }
 
+// What the other views do not show.
+const ONLY_CUTS = { views: ["cuts"] };
+
 // Switch points of the data off, or on again; they are named by their row in the data set.
 function switchPoints(app, rows, on) {
   app.change(state => {
@@ -236,7 +239,7 @@ function switchPoints(app, rows, on) {
     const off = new Set(data.off ?? []);
     for (const row of rows) if (on) off.delete(row); else off.add(row);
     data.off = [...off].sort((a, b) => a - b);
-  });
+  }, ONLY_CUTS);
 }
 
 VIEWS.push({
@@ -245,7 +248,7 @@ VIEWS.push({
   wide: true,
   build(place, app) {
     const looks = app.catalogue.looks;
-    const set = (edit, options) => app.change(state => edit(state.settings.cuts ??= {}, state), options);
+    const set = (edit, options = ONLY_CUTS) => app.change(state => edit(state.settings.cuts ??= {}, state), options);
     const lineId = freshId("line"), angleId = freshId("angle");
     const line = element("select", { id: lineId, onchange: () => set((settings, state) => {
       const chosen = cut?.header.cuts[Number(line.value)];
@@ -253,7 +256,7 @@ VIEWS.push({
       if (!chosen) { delete settings.cut; return; }
       settings.cut = { kind: chosen.kind, constant: chosen.constant, group: chosen.group };
       if (settings.follow && chosen.kind === "theta_i") state.light.theta_i = Math.round(chosen.constant * 1e3) / 1e3;
-    }) });
+    }, {}) });
     const angleLabel = element("label", { for: angleId });
     const angle = element("input", { type: "number", id: angleId, class: "number", step: "any", onchange: () => {
       if (angle.value !== "") set(settings => { settings[settings.along === "phi" ? "theta_r" : "phi"] = Number(angle.value); });
@@ -268,7 +271,7 @@ VIEWS.push({
       settings.follow = on;
       const chosen = cut?.header.cuts[Number(line.value)];
       if (on && chosen?.kind === "theta_i") state.light.theta_i = Math.round(chosen.constant * 1e3) / 1e3;
-    }));
+    }, {}));
     const legend = element("ul", { class: "key" });
     const note = element("p", { class: "about", role: "status" });
     const readout = element("p", { class: "readout" });
