@@ -9,10 +9,6 @@ import pytest
 import pbrdf
 from browser import chromium
 
-playwright = pytest.importorskip("playwright.sync_api")
-# WebGL2 without a graphics card
-FLAGS = ("--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
-
 
 @pytest.fixture
 def served():
@@ -62,16 +58,10 @@ def apart():
     return call
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def chrome():
-    """Chromium without a window."""
-    program = chromium()
-    if program is None:
-        pytest.skip("no Chromium or Chrome on this machine (apt-get install chromium)")
-    with playwright.sync_playwright() as p:
-        browser = p.chromium.launch(executable_path=program, args=list(FLAGS))
+    with chromium() as browser:
         yield browser
-        browser.close()
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ import pbrdf
 from pbrdf.data import make_dataset
 from pbrdf.explorer.catalogue import layer_of, state_of
 from pbrdf.explorer.state import StateError, read_state
-from pbrdf.explorer.views.cuts import draw, unwrapped
+from pbrdf.explorer.views.cuts import draw, half_turn_of
 from pbrdf.explorer.workspace import Workspace
 from pbrdf.optics import stokes as optics_stokes
 
@@ -69,7 +69,7 @@ def test_curves_along_the_azimuth_are_those_of_mueller(white):
     known = np.isfinite(off)
     assert known.sum() > 300
     np.testing.assert_allclose(off[known] - 180.0 * np.round(off[known] / 180.0), 0.0, atol=1e-4)
-    assert np.abs(np.diff(drawn.curves[0, 3][known])).max() < 90.0
+    assert np.ptp(drawn.curves[0, 3][known]) <= 180.0
 
 
 def test_hidden_models_have_no_curve_and_the_difference_is_that_of_the_curves(white, pearl):
@@ -139,16 +139,28 @@ def test_points_in_an_azimuth_at_the_angle_of_the_light(white):
     workspace.close()
 
 
-def test_angles_have_no_jumps_at_half_a_turn():
-    true = np.linspace(60.0, 300.0, 50)
-    folded = (true + 90.0) % 180.0 - 90.0
-    folded[20:23] = np.nan
-    joined = unwrapped(folded)
-    known = np.isfinite(folded)
-    np.testing.assert_allclose(np.diff(joined[known]), np.diff(true[known]))
-    assert abs(np.median(joined[known]) - 45.0) <= 90.0
-    np.testing.assert_allclose(unwrapped(folded, near=180.0)[known], true[known])
-    assert np.isnan(unwrapped(np.full(3, np.nan))).all()
+def test_angles_are_drawn_within_the_half_turn_that_they_leave_least():
+    steady = np.array([0.0, 90.0, 80.0, np.nan, -10.0])
+    assert half_turn_of(steady) == -45.0
+    around_135 = np.array([130.0, -44.0, 128.0, np.nan, -41.0, 133.0])
+    assert half_turn_of(around_135) == 45.0
+    assert half_turn_of(np.full(3, np.nan)) == -45.0
+
+
+def test_angles_of_points_and_curves_share_their_half_turn(white):
+    ds = pbrdf.open_experiment("matte-white-thick")
+    workspace = Workspace(datasets=[("white", ds)])
+    drawn = Drawn(content_of(white, quantities=["aolp"]), workspace)
+    workspace.close()
+    at = ds.isel(geometry=drawn.header["rows"])
+    measured, _, deviation, _ = drawn.points[0]
+    known = np.isfinite(measured)
+    assert known.sum() > 5
+    expected = 0.5 * np.rad2deg(np.arctan2(at["U"].values, at["Q"].values))
+    turns = (measured - expected)[known] / 180.0
+    np.testing.assert_allclose(turns, np.round(turns), atol=1e-9)
+    assert np.all((measured[known] >= -45.0) & (measured[known] <= 135.0))
+    assert np.nanmax(np.abs(deviation)) < 5.0  # not half a turn away
 
 
 @pytest.mark.parametrize(

@@ -76,9 +76,7 @@ def test_a_table_is_opened_while_pictures_are_drawn(page, white, monkeypatch):
         assert page.heard.wait_for(lambda: len(page.sent) == 2, 60)
     answer = page.sent[-1]
     assert (answer["type"], answer["id"], answer["name"]) == ("opened", 7, "x.csv")
-    assert answer["datasets"][0]["name"] == "x.csv" and "63 geometries" in " ".join(
-        answer["datasets"][0]["lines"]
-    )
+    assert answer["datasets"] == ["x.csv"] and "63 geometries" in " ".join(answer["lines"])
     ((name, dataset),) = page.session.workspace.datasets
     assert name == "x.csv" and dataset.identical(pbrdf.open_experiment("white"))
 

@@ -145,8 +145,10 @@ class Measured:
 
     def summary(self) -> dict[str, Any]:
         """What the page says of the data set."""
-        groups = list(dict.fromkeys(self.points.group))
+        groups = sorted({str(g) for g in self.points.group}, key=lambda g: (not g.isdigit(), g.zfill(20)))
         incidences = np.unique(np.round(self.points.theta_i, 1))
+        # readers of hemispherical data call a group by its angle of incidence: once is enough
+        by_angle = {str(g) for g in groups} == {f"{angle:.0f}" for angle in incidences}
         wavelengths = known_wavelengths(self.whole)
         named = {"intensity": "intensity", "dolp": "DoLP", "aolp": "AoLP"}
         measured = [named.get(n, n) for n in (*self.points.channels, *self.points.polarised)]
@@ -163,7 +165,7 @@ class Measured:
             "measured": list(dict.fromkeys(measured)),
             "wavelengths": wavelengths,
             "wavelength": self.wavelength,
-            "groups": groups if 1 < len(groups) <= _MOST_LISTED else [],
+            "groups": groups if 1 < len(groups) <= _MOST_LISTED and not by_angle else [],
             "incidences": incidences.tolist() if len(incidences) <= _MOST_LISTED else [],
         }
 

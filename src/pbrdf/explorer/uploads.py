@@ -2,9 +2,8 @@
 
 They are opened as what the command line names, in a process of its own, :mod:`pbrdf.explorer.upload_process`, with
 limits of time and memory, while sliders go on moving. The bytes lie in a temporary folder for as long as they are read,
-under a name that cannot lead out of it. The answer is ``{type: "opened", name, layers, datasets, maps}``: models as
-layers of the state, data sets as ``{name, lines}`` with what is in them in words, maps by name; or an error about
-``open``.
+under a name that cannot lead out of it. The answer is ``{type: "opened", name, layers, datasets, maps, lines}``:
+models as layers of the state, data sets and maps by name, and what is in the data in words; or an error about ``open``.
 """
 
 from __future__ import annotations
@@ -126,7 +125,8 @@ def _opened(name: str, content: bytes, options: Mapping[str, Any], workspace: Wo
     return {
         "name": name,
         "layers": [layer_of(own, model) for own, model in found.models],
-        "datasets": [{"name": own, "lines": describe(dataset)} for own, dataset in datasets],
+        "datasets": [own for own, _ in datasets],
+        "lines": [line for _, dataset in datasets for line in describe(dataset)],
         "maps": [own for own, _ in found.maps],
     }
 

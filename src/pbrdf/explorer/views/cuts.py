@@ -23,7 +23,7 @@ from pbrdf.report.dataset.cuts import Cut
 from pbrdf.report.dataset.quantities import is_element
 from pbrdf.report.dataset.shown_cuts import ShownCuts
 
-__all__ = ["Line", "draw", "line_of", "unwrapped"]
+__all__ = ["Line", "draw", "half_turn_of", "line_of"]
 
 ALONG = ("theta_r", "phi", "data")
 #: Directions of a line, spread evenly, and around the mirror direction, where peaks are narrow.
@@ -32,6 +32,8 @@ _EVEN, _NEAR = 361, 81
 _GRAZING, _PEAK = 89.0, 4.0
 #: How far a point may be off the line: zenith angles and azimuths, degrees.
 _NEARBY, _NEARBY_AZIMUTH = 0.3, 1.0
+#: Where half a turn of angles of polarisation begins, degrees.
+_STARTS = (-45.0, 45.0)
 #: Where the mirror direction is on a line, in shares of what is constant there.
 _MIRROR = {"theta_i": 1.0, "theta_r": 1.0, "bistatic": 0.5}
 
@@ -97,7 +99,10 @@ def draw(state: State, workspace: Workspace, dragging: bool) -> tuple[dict[str, 
     curves[state.active] = both[:, :size]
     points = _points(state, choice, line, both[:, size:])
     if "aolp" in state.quantities:
-        _continuous(curves, points, state, line)
+        k = state.quantities.index("aolp")
+        start = half_turn_of(curves[state.active][k])
+        for angle in (*(curve[k] for curve in curves.values()), points[k, 0]):
+            angle[:] = _within(angle, start)
     difference = np.empty((0,))
     if state.compare is not None:
         difference = curves[state.active] - curves[state.compare]
@@ -163,11 +168,9 @@ def line_of(state: State, choice: Choice | None, cuts: ShownCuts) -> Line:
     if not -180.0 <= phi <= 180.0:
         raise StateError("settings.cuts.phi", "the azimuth is within −180 … 180 degrees")
     x = _with_peak(-_GRAZING, _GRAZING, [theta_i if abs(phi) < 90.0 else -theta_i])
-    where, beyond = (
-        ("plane of incidence", "on the source's side")
-        if phi == 0.0
-        else (f"φ = {phi:.4g}°", "beyond the normal")
-    )
+    where, beyond = "plane of incidence", "on the source's side"
+    if phi != 0.0:
+        where, beyond = f"φ = {phi:.4g}°", "beyond the normal"
     line = Line(
         f"θi = {theta_i:.4g}°, {where}".replace("-", "−"),
         f"viewing angle θr (°), − {beyond}",
@@ -283,36 +286,19 @@ def _points(state: State, choice: Choice | None, line: Line, expected: np.ndarra
     return found
 
 
-def unwrapped(angle: np.ndarray, near: float | None = None) -> np.ndarray:
-    """Angles of polarisation in degrees, which are the same after half a turn, without its jumps; NaN stays.
+def half_turn_of(angle: np.ndarray) -> float:
+    """Where the half turn begins within which angles of polarisation along a curve are drawn, degrees.
 
-    Parameters
-    ----------
-    angle
-        Along a curve, shape (N,).
-    near
-        What their median is to be near to; None for the range −45 … 135 of the figures.
+    It is that of the figures, −45 … 135, or 45 … 225 where the curve crosses the ends of that less often: light that is
+    polarised at 135° would jump from end to end. Neither of p and s lies on an end.
     """
-    known = np.isfinite(angle)
-    result = angle.copy()
-    if not known.any():
-        return result
-    result[known] = np.unwrap(angle[known], period=180.0)
-    middle = float(np.median(result[known]))
-    return result + 180.0 * np.round(((45.0 if near is None else near) - middle) / 180.0)
+    known = angle[np.isfinite(angle)]
+
+    def crossings(start: float) -> int:
+        return int((np.abs(np.diff(_within(known, start))) > 90.0).sum())
+
+    return min(_STARTS, key=crossings)
 
 
-def _continuous(curves: dict[int, np.ndarray], points: np.ndarray, state: State, line: Line) -> None:
-    """Angles of polarisation without jumps: other models and the points beside the active model; in place."""
-    k = state.quantities.index("aolp")
-    active = curves[state.active]
-    active[k] = unwrapped(active[k])
-    reference = active[k][np.isfinite(active[k])]
-    near = float(np.median(reference)) if reference.size else None
-    for i, curve in curves.items():
-        if i != state.active:
-            curve[k] = unwrapped(curve[k], near)
-    if points.shape[2] and near is not None:
-        known = np.isfinite(active[k])
-        beside = np.interp(line.at, line.x[known], active[k][known])
-        points[k, 0] = beside + within_half_turn(points[k, 0] - beside, 90.0)
+def _within(angle: np.ndarray, start: float) -> np.ndarray:
+    return start + (angle - start) % 180.0

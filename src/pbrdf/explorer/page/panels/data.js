@@ -4,7 +4,7 @@ PANELS.push({
   name: "data",
   title: "Measured data",
   build(place, app) {
-    const set = edit => app.change(state => edit(state.settings.data ??= {}, state));
+    const set = edit => app.change(state => edit(state.settings.data ??= {}), ONLY_CUTS);
     const words = element("p", { class: "about" }, "No measured data are open. Drop a file of data on the page, or start with: pbrdf explore FILE");
     const inside = element("div", { class: "measured", hidden: true });
     const fault = element("p", { class: "fault", role: "alert" });
@@ -89,7 +89,7 @@ PANELS.push({
     app.on("answer:opened", ({ datasets }) => {
       if (!app.state || !datasets?.length) return;
       asked = null;
-      app.change(state => { state.settings.data = { set: datasets[0] }; });
+      app.change(state => { state.settings.data = { set: datasets[0] }; }, ONLY_CUTS);
     });
     app.on("answer:error", content => { if (content.about === "data") fault.textContent = content.text; });
     return {

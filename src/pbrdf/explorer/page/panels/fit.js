@@ -7,7 +7,7 @@ PANELS.push({
   name: "fit",
   title: "Fit",
   build(place, app) {
-    const set = edit => app.change(state => edit(state.settings.fit ??= {}));
+    const set = edit => app.change(state => edit(state.settings.fit ??= {}), { views: [] });
     const list = element("div", { class: "list" });
     const startsId = freshId("starts");
     const starts = element("input", { type: "number", id: startsId, class: "number", min: 1, max: 256, step: 1, onchange: () => set(settings => { settings.starts = Number(starts.value); }) });
@@ -60,6 +60,7 @@ PANELS.push({
       const what = of < wanted ? "the best start is refined on all points" : `${done} of ${of} starts are done`;
       status.textContent = `χ² of the sliders ${chiSquare(chi2)}; ${what}`;
     });
+    app.on("disconnected", () => { run(false); status.textContent = ""; });
     app.on("answer:fit_cancelled", () => { run(false); status.textContent = "The fit was cancelled."; });
     app.on("answer:error", content => {
       if (content.about !== "fit" && content.about !== "cancel_fit") return;
@@ -97,7 +98,7 @@ function describeFit(fit, app, take) {
     element("p", { class: "verdict" }, element("strong", {}, fit.verdict)),
     element("table", { class: "estimates" },
       element("caption", {}, "Parameters with standard errors"),
-      element("thead", {}, row("th", ["", "value", "the data say"])),
+      element("thead", {}, row("th", ["parameter", "value", "the data say"])),
       element("tbody", {}, fit.estimates.map(e => row("td", [e.symbol, e.written + unit(e), e.verdict])))),
     element("dl", {}, [
       ["χ² / degrees of freedom", `${chiSquare(fit.chi2)} / ${fit.freedom}${fit.reduced_chi2 === null ? "" : ` = ${written(fit.reduced_chi2, 3)}`}`],
@@ -113,7 +114,7 @@ function describeFit(fit, app, take) {
     const symbols = names.map(name => fit.estimates.find(e => e.name === name)?.symbol ?? name);
     parts.push(element("table", { class: "correlation" },
       element("caption", {}, "Correlations"),
-      element("thead", {}, row("th", ["", ...symbols])),
+      element("thead", {}, element("tr", {}, element("td"), symbols.map(symbol => element("th", { scope: "col" }, symbol)))),
       element("tbody", {}, matrix.map((line, i) => element("tr", {}, element("th", { scope: "row" }, symbols[i]), line.map(r => {
         const cell = element("td", {}, r === null ? "–" : r.toFixed(2).replace("-", "−"));
         if (r !== null) {

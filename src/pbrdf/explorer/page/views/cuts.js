@@ -116,11 +116,13 @@ class CutPlot {
     this.node.append(grid, words, drawn("svg", { x: CUT_LEFT, y: top, width, height, viewBox: `0 0 ${width} ${height}` }, ...inside));
   }
 
-  path(xs, ys, axis, attributes) {
+  // A line through values; one of angles that are the same after half a turn ends where it leaves their range.
+  path(xs, ys, axis, attributes, turning = false) {
     let d = "", pen = "M";
     for (let i = 0; i < xs.length; ++i) {
       const value = ys[i];
       if (!Number.isFinite(value) || (axis.logarithmic && value <= 0)) { pen = "M"; continue; }
+      if (turning && Math.abs(value - ys[i - 1]) > 90) pen = "M";
       d += `${pen}${this.x.at(xs[i]).toFixed(1)} ${Math.min(Math.max(axis.at(value), -1e4), 1e4).toFixed(1)}`;
       pen = "L";
     }
@@ -147,7 +149,7 @@ class CutPlot {
     const y = new CutAxis(ends, CUT_HEIGHT, 0, logarithmic);
     const inside = header.layers.map((layer, i) => this.path(x, curves[i], y, {
       stroke: looks[layer % looks.length].colour, "stroke-width": layer === cut.active ? 2.4 : 1.5, "stroke-dasharray": looks[layer % looks.length].dash.join(" "),
-    }));
+    }, name === "aolp"));
     this.marks = [];
     const low = [];
     const heaviest = Math.max(...[...weight].filter(Number.isFinite), 0);
@@ -184,8 +186,8 @@ class CutPlot {
     if (cut.difference.length) {
       top += CUT_GAP + CUT_TOP / 2;
       const curve = cut.difference.subarray(k * size, (k + 1) * size);
-      const axis = new CutAxis(this.range("difference", cutRange(curve, { centred: true, least: 1e-6 }), header.dragging), CUT_LOW, 0);
-      this.panel(top, CUT_LOW, axis, `difference: ${cut.names[cut.active]} − ${cut.names[cut.compare]}`, [this.path(x, curve, axis, { class: "difference" })]);
+      const axis = new CutAxis(this.range("difference", cutRange(curve, { centred: true, least: 1e-3 }), header.dragging), CUT_LOW, 0);
+      this.panel(top, CUT_LOW, axis, `difference: ${cut.names[cut.active]} − ${cut.names[cut.compare]}`, [this.path(x, curve, axis, { class: "difference" }, name === "aolp")]);
       top += CUT_LOW;
     }
     const words = drawn("g", { class: "words" });
@@ -227,6 +229,9 @@ function cutMark(x, y, kind, radius) {
   return drawn("circle", { class: `mark-${kind}`, cx: x, cy: y, r: radius });
 }
 
+// What the other views do not show.
+const ONLY_CUTS = { views: ["cuts"] };
+
 // Switch points of the data off, or on again; they are named by their row in the data set.
 function switchPoints(app, rows, on) {
   app.change(state => {
@@ -234,7 +239,7 @@ function switchPoints(app, rows, on) {
     const off = new Set(data.off ?? []);
     for (const row of rows) if (on) off.delete(row); else off.add(row);
     data.off = [...off].sort((a, b) => a - b);
-  });
+  }, ONLY_CUTS);
 }
 
 VIEWS.push({
@@ -243,7 +248,7 @@ VIEWS.push({
   wide: true,
   build(place, app) {
     const looks = app.catalogue.looks;
-    const set = (edit, options) => app.change(state => edit(state.settings.cuts ??= {}, state), options);
+    const set = (edit, options = ONLY_CUTS) => app.change(state => edit(state.settings.cuts ??= {}, state), options);
     const lineId = freshId("line"), angleId = freshId("angle");
     const line = element("select", { id: lineId, onchange: () => set((settings, state) => {
       const chosen = cut?.header.cuts[Number(line.value)];
@@ -251,7 +256,7 @@ VIEWS.push({
       if (!chosen) { delete settings.cut; return; }
       settings.cut = { kind: chosen.kind, constant: chosen.constant, group: chosen.group };
       if (settings.follow && chosen.kind === "theta_i") state.light.theta_i = Math.round(chosen.constant * 1e3) / 1e3;
-    }) });
+    }, {}) });
     const angleLabel = element("label", { for: angleId });
     const angle = element("input", { type: "number", id: angleId, class: "number", step: "any", onchange: () => {
       if (angle.value !== "") set(settings => { settings[settings.along === "phi" ? "theta_r" : "phi"] = Number(angle.value); });
@@ -266,9 +271,9 @@ VIEWS.push({
       settings.follow = on;
       const chosen = cut?.header.cuts[Number(line.value)];
       if (on && chosen?.kind === "theta_i") state.light.theta_i = Math.round(chosen.constant * 1e3) / 1e3;
-    }));
+    }, {}));
     const legend = element("ul", { class: "key" });
-    const note = element("p", { class: "fault" });
+    const note = element("p", { class: "about", role: "status" });
     const readout = element("p", { class: "readout" });
     const plots = element("div", {
       class: "plots", tabindex: 0, role: "slider", "aria-label": "Place along the curves",
@@ -292,7 +297,7 @@ VIEWS.push({
       const parts = header.quantities.map(({ label }, k) => {
         const models = header.layers.map((layer, i) => [cut.names[layer], curves[(i * many + k) * size + index]])
           .filter(([, value]) => Number.isFinite(value)).map(([name, value]) => `${name} ${written(value, 4)}`);
-        if (point === null) return `${label}: ${models.join(", ")}`;
+        if (point === null) return `${label}: ${models.join(", ") || "none"}`;
         const [measured, std, deviation, weight] = [0, 1, 2, 3].map(j => points[(4 * k + j) * at.length + point]);
         if (!Number.isFinite(measured)) return `${label}: not measured`;
         const bar = std > 0 ? ` ± ${written(std, 2)}` : "";

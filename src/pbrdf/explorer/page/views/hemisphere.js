@@ -73,6 +73,7 @@ class PictureBoard {
 VIEWS.push({
   name: "hemisphere",
   title: "Hemisphere",
+  wide: true,
   build(place, app) {
     const tables = app.catalogue.colours;
     const board = new PictureBoard(place, tables);
@@ -134,7 +135,7 @@ VIEWS.push({
           onclick: event => { kept = point(event); read(); },
         }, canvas, rings.node);
         const bar = colourBar(tables), title = element("span");
-        const fix = element("button", { type: "button", class: "quiet", title: "Fix the range of these colours", onclick: () => figure.toggle() }, "fix range");
+        const fix = element("button", { type: "button", class: "fix", title: "Fix the range of these colours", onclick: () => figure.toggle() }, "fix range");
         const ends = ["least", "largest"].map(which => element("input", {
           type: "number", step: "any", "aria-label": `${which} value of the colours`, onchange: () => figure.set(),
         }));

@@ -12,9 +12,10 @@ VIEWS.push({
     const cells = [];
     const update = () => cells.forEach(cell => cell.node.setAttribute("aria-pressed", String(app.state.quantities.includes(cell.quantity))));
     const toggle = quantity => app.change(state => {
-      const others = state.quantities.filter(q => q !== quantity);
-      state.quantities = others.length < state.quantities.length ? others : [...others, quantity];
-      if (!state.quantities.length) state.quantities = ["intensity"];
+      const chosen = new Set(state.quantities);
+      if (!chosen.delete(quantity)) chosen.add(quantity);
+      // in the catalogue's order, and never none
+      if (chosen.size) state.quantities = app.catalogue.quantities.filter(q => chosen.has(q));
     });
     app.on("state", update);
     return {
