@@ -22,7 +22,7 @@ import numpy as np
 
 from pbrdf.backend import get_backend
 from pbrdf.errors import DataError
-from pbrdf.explorer.evaluation import mueller_matrix
+from pbrdf.explorer.evaluation import mueller_matrix, prepare
 from pbrdf.explorer.state import Light, State, StateError, number
 from pbrdf.explorer.workspace import Workspace
 from pbrdf.instruments.goniometer.rays import UPRIGHT, across, angles_of
@@ -108,6 +108,8 @@ def draw(state: State, workspace: Workspace, dragging: bool) -> tuple[dict[str, 
     fields = [
         picture(layer.model.with_accuracy(accuracy), lamp, state.light, state.part, shape) for layer in layers
     ]
+    if not dragging:
+        prepare(state, ["ball"], lambda: draw(state, workspace, True))
     header = {
         "shape": list(fields[0].shape),
         "channels": ["radiance", "q", "u", "v"],
