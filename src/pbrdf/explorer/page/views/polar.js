@@ -69,6 +69,17 @@ const QUANTITY_TITLES = { intensity: "Intensity", dolp: "DoLP", aolp: "AoLP", q:
 const quantityTitle = name => QUANTITY_TITLES[name] ?? `M${name[1]}${name[2]}`;
 const rgbOf = hex => [1, 3, 5].map(at => parseInt(hex.slice(at, at + 2), 16) / 255);
 
+// Whether there is no graphics card.
+let processorDraws = null;
+function drawnByProcessor() {
+  if (processorDraws === null) {
+    const gl = document.createElement("canvas").getContext("webgl2"), names = gl?.getExtension("WEBGL_debug_renderer_info");
+    processorDraws = /swiftshader|llvmpipe|software|basic render/i.test(gl?.getParameter(names ? names.UNMASKED_RENDERER_WEBGL : gl.RENDERER) ?? "");
+    gl?.getExtension("WEBGL_lose_context")?.loseContext();
+  }
+  return processorDraws;
+}
+
 VIEWS.push({
   name: "polar",
   title: "Polar surface",
@@ -77,8 +88,8 @@ VIEWS.push({
     const canvas = element("canvas", { width: 600, height: 450, tabindex: 0, role: "application", "aria-label": label, "aria-roledescription": "turnable picture" });
     const words = element("canvas", { width: 600, height: 450, "aria-hidden": "true" });
     const frame = element("div", { class: "turnable" }, canvas, words);
-    // the first to ask decides: lines and edges want smoothing, which fields do not
-    canvas.getContext("webgl2", { antialias: true, preserveDrawingBuffer: true });
+    // the first to ask decides; where the processor draws, smooth edges would take most of its time
+    canvas.getContext("webgl2", { antialias: !drawnByProcessor(), preserveDrawingBuffer: true });
     const graphics = new Graphics(canvas, SURFACE, SURFACE_VERTEX), gl = graphics.gl;
     const tables = Object.fromEntries(Object.entries(app.catalogue.colours).map(([name, text]) => [name, decoded(text)]));
     let header = null, fields = [], surface = null, net = null, meshed = "", values = null;
@@ -160,20 +171,21 @@ VIEWS.push({
 
     const strokes = gl.createBuffer(), slots = ["start", "end"].map(name => gl.getAttribLocation(graphics.program, name));
     function stroke(lines) {
-      const corners = [], ends = [];
-      for (const { points } of lines) {
+      const corners = [], groups = [];
+      for (const { points, width, ink } of lines) {
         for (let i = 0; i + 1 < points.length; i++) for (let k = 0; k < 6; k++) corners.push(...points[i], ...points[i + 1]);
-        ends.push(corners.length / 6);
+        // a call for all that look alike: where the processor draws, calls are dear
+        if (groups.at(-1)?.width !== width || groups.at(-1).ink !== ink) groups.push({ width, ink, first: groups.at(-1)?.end ?? 0 });
+        groups.at(-1).end = corners.length / 6;
       }
       gl.bindBuffer(gl.ARRAY_BUFFER, strokes);
       gl.bufferData(gl.ARRAY_BUFFER, new Float32Array(corners), gl.STREAM_DRAW);
       slots.forEach((slot, i) => { gl.enableVertexAttribArray(slot); gl.vertexAttribPointer(slot, 3, gl.FLOAT, false, 24, 12 * i); });
-      lines.forEach(({ width, ink }, i) => {
+      for (const { width, ink, first, end } of groups) {
         graphics.vector("ink", ink);
         graphics.number("width", width * (window.devicePixelRatio || 1));
-        const first = i ? ends[i - 1] : 0;
-        gl.drawArrays(gl.TRIANGLES, first, ends[i] - first);
-      });
+        gl.drawArrays(gl.TRIANGLES, first, end - first);
+      }
       slots.forEach(slot => gl.disableVertexAttribArray(slot));
     }
 
