@@ -141,15 +141,14 @@ VIEWS.push({
       return both || mode === "circular" ? [-most, most] : [0, most];
     }
 
-    // What the colours stand for, at the grid's points.
+    // What the colours stand for, at the grid's points; not for angles.
     function scalars(values, { mode, polariser }) {
       const count = values.length / 4, found = new Float32Array(count);
       // the dial stands between two of the polarisers at most by rounding
       const at = 4 * Math.round(polariser % 180 / 180 * (polarisers.length / 4 - 1)), [a, b, c, d] = polarisers.subarray(at, at + 4);
       for (let k = 0; k < count; k++) {
         const L = values[4 * k], q = values[4 * k + 1], u = values[4 * k + 2], v = values[4 * k + 3];
-        found[k] = mode === "radiance" ? L : mode === "polariser" ? L * (a + b * q + c * u + d * v) : mode === "dolp" ? Math.sqrt(q * q + u * u)
-          : mode === "aolp" ? 0.5 * Math.atan2(u, q) : v;
+        found[k] = mode === "radiance" ? L : mode === "polariser" ? L * (a + b * q + c * u + d * v) : mode === "dolp" ? Math.sqrt(q * q + u * u) : v;
       }
       return found;
     }
@@ -160,19 +159,25 @@ VIEWS.push({
       if (!known) return;
       const [rows, columns] = header.shape, size = canvas.width, map = ballMap(size, rows, header.rim);
       const tone = !both && ["radiance", "polariser"].includes(chosen.mode), gain = Math.PI * 2 ** chosen.exposure;
-      const name = both || chosen.mode === "circular" ? "signed" : chosen.mode === "aolp" ? "cyclic" : "sequential";
+      const name = chosen.mode === "aolp" ? "cyclic" : both || chosen.mode === "circular" ? "signed" : "sequential";
       const table = tone ? greyLevels : levelTable(app.catalogue.colours[name]);
       const [low, high] = tone ? [0, TONES / gain] : range(), scale = (table.length - 1) / (high - low), last = table.length - 1;
       if (image?.width !== size) image = pen.createImageData(size, size);
       const pixels = new Uint32Array(image.data.buffer), { pixel } = map;
       ballCorners(map, columns, header.lamp[1]);
       const { corner, along, row } = map, count = pixel.length;
-      if (chosen.mode === "aolp" && !both) {
-        const [values] = fields;
+      if (chosen.mode === "aolp") {
+        // axes have no jump where their angles have one: what turns with twice the angle is blended
+        const [values, others] = fields;
         for (let k = 0; k < count; k++) {
           const wr = row[k] - (row[k] | 0), wc = along[k];
-          const q = blended(values, corner[k], columns, wr, wc, 4, 1), u = blended(values, corner[k], columns, wr, wc, 4, 2);
-          const fade = Math.min(Math.sqrt(q * q + u * u) / 0.01, 1), colour = table[(0.5 * Math.atan2(u, q) - low) * scale + 0.5 | 0];
+          let q = blended(values, corner[k], columns, wr, wc, 4, 1), u = blended(values, corner[k], columns, wr, wc, 4, 2), dolp = Math.sqrt(q * q + u * u);
+          if (both) {
+            const p = blended(others, corner[k], columns, wr, wc, 4, 1), v = blended(others, corner[k], columns, wr, wc, 4, 2);
+            dolp = Math.min(dolp, Math.sqrt(p * p + v * v));
+            [q, u] = [q * p + u * v, u * p - q * v];
+          }
+          const fade = Math.min(dolp / 0.01, 1), colour = table[(0.5 * Math.atan2(u, q) - low) * scale + 0.5 | 0];
           pixels[pixel[k]] = fade < 1 ? towardsGrey(colour, GREY.unpolarised, 1 - fade * fade * (3 - 2 * fade)) : colour;
         }
       } else {
@@ -180,7 +185,6 @@ VIEWS.push({
         if (both) {
           const other = scalars(fields[1], chosen);
           for (let k = 0; k < shown.length; k++) shown[k] -= other[k];
-          if (chosen.mode === "aolp") for (let k = 0; k < shown.length; k++) shown[k] -= Math.PI * Math.round(shown[k] / Math.PI);
         }
         for (let k = 0; k < shown.length; k++) shown[k] = (shown[k] - low) * scale + 0.5;
         for (let k = 0; k < count; k++) {
