@@ -152,6 +152,7 @@ def test_commands_name_paints_as_they_are_and_others_by_their_files(state):
 def test_what_is_left_out_is_said(state):
     assert "natural light" in made(state, "overview", "svg").note
     assert "not a part" in made({**state, "part": "specular"}, "curves", "svg").note
+    assert "not their difference" in made({**state, "compare": 1}, "curves", "svg").note
     assert made(state, "curves", "svg").note == ""
 
 

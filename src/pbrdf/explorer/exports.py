@@ -146,6 +146,8 @@ def _figure(state: State, workspace: Workspace, what: str, kind: str) -> Export:
     notes = []
     if state.part != "total":
         notes.append("it shows all light of the models, not a part")
+    if state.compare is not None:
+        notes.append("it shows the models, not their difference")
     if alone and light != NATURAL_LIGHT:
         notes.append("it is drawn in natural light")
     incident = None if what in ("overview", "mueller") or light == NATURAL_LIGHT else light
