@@ -116,7 +116,8 @@ def test_models_light_and_quantities(opened):
     page.get_by_role("button", name="Duplicate other").click()
     page.get_by_label("Difference to").select_option(label="thick")
     page.get_by_role("button", name="Hide other", exact=True).click()
-    page.get_by_label("Add").select_option(label="ggx-lambert")
+    page.get_by_label("Another model").select_option(label="ggx-lambert")
+    page.get_by_role("button", name="Add", exact=True).click()
     state = state_of_page(page)
     assert [layer["name"] for layer in state["layers"]] == ["thick", "other", "other 2", "ggx-lambert"]
     assert [layer["shown"] for layer in state["layers"]] == [True, False, True, True]
