@@ -311,7 +311,13 @@ VIEWS.push({
       event.preventDefault();
     });
     keepSharp(canvas, redraw);
-    app.on("state", update);
+    // a moved slider has its picture to come; what stands is drawn again where the settings or the names are others
+    let followed = "";
+    app.on("state", () => {
+      const now = JSON.stringify([settings(), app.state.layers.map(layer => layer.name)]);
+      if (now !== followed) update();
+      followed = now;
+    });
     app.on("theme", redraw);
     return {
       show(content, buffers) {
