@@ -10,7 +10,7 @@ function directionRings() {
     return drawn("line", { x1: x, y1: y, x2: -x, y2: -y });
   });
   const words = [
-    ...[0, 90, 180, 270].map(azimuth => write(...at(90 * (azimuth % 180 ? 1.06 : 1.08), azimuth), `${azimuth}°`)),
+    ...[0, 90, 180, -90].map(azimuth => write(...at(90 * (azimuth % 180 ? 1.06 : 1.08), azimuth), `${azimuth}°`.replace("-", "−"))),
     ...[30, 60].map(zenith => write(...at(zenith, 67.5), `${zenith}°`)),
   ];
   // a wide dark stroke under a narrow light one is seen on every colour
@@ -79,7 +79,7 @@ VIEWS.push({
     const board = new PictureBoard(place, tables);
     const readout = element("output", { class: "readout", "aria-live": "polite" });
     const hint = "Point at a picture, or move the cross with the arrow keys, to read values.";
-    place.append(readout);
+    place.append(readout, element("p", { class: "about" }, "Sun: where the light comes from. Diamond: its mirror direction."));
     Object.assign(board.node, { tabIndex: 0 });
     board.node.setAttribute("role", "group");
     board.node.setAttribute("aria-label", "Pictures over the hemisphere of viewing directions; the arrow keys move a cross whose values are read out, Shift in steps of ten degrees, Escape takes it away");
@@ -98,7 +98,7 @@ VIEWS.push({
     // Direction at a point of a picture, from its middle in radii; none outside of the hemisphere.
     const directionAt = (x, y) => {
       const zenith = 90 * Math.hypot(x, y);
-      return zenith > 90 ? null : [zenith, (Math.atan2(y, x) * 180 / Math.PI + 360) % 360];
+      return zenith > 90 ? null : [zenith, Math.atan2(y, x) * 180 / Math.PI];
     };
     const point = event => {
       const box = event.currentTarget.getBoundingClientRect();
@@ -173,7 +173,6 @@ VIEWS.push({
     app.on("drawn", () => board.node.dispatchEvent(new CustomEvent("pbrdf-drawn", { bubbles: true })));
     return {
       show(given, [buffer]) {
-        if (given.error) return;
         const same = header && header.pictures.map(p => p.quantity).join() === given.pictures.map(p => p.quantity).join();
         header = given;
         board.load(header, buffer);
@@ -181,6 +180,8 @@ VIEWS.push({
         header.pictures.forEach((picture, i) => figures[i].update(picture));
         if (!same) board.fit();
         board.paint();
+        // values that run along with a slider are for the eyes alone
+        readout.setAttribute("aria-live", header.dragging ? "off" : "polite");
         read();
         if (!header.dragging) figures.forEach(figure => figure.name());
       },

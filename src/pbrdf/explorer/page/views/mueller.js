@@ -20,7 +20,6 @@ VIEWS.push({
     app.on("state", update);
     return {
       show(header, [buffer]) {
-        if (header.error) return;
         if (!cells.length) {
           for (const { quantity, symbol } of header.pictures) {
             const canvas = element("canvas", { "aria-hidden": "true" });
