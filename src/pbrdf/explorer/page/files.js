@@ -4,6 +4,7 @@
 const MOST_STATE = 1 << 20, MOST_BYTES = 48 << 20;
 
 function openFiles(app, el) {
+  const asker = askerOf(app, el);
   const input = element("input", { type: "file", multiple: true, class: "unseen", tabindex: -1, "aria-hidden": "true", onchange: async () => {
     await take([...input.files]);
     input.value = "";
@@ -15,10 +16,7 @@ function openFiles(app, el) {
       const state = await stateIn(file);
       if (state) app.send({ type: "read_state", state, from: file.name });
       else if (file.size > MOST_BYTES) app.tell("note", `${file.name}: ${Math.round(file.size / 1e6)} MB are more than the page takes; open it with pbrdf explore ${file.name}`);
-      else {
-        app.tell("note", `Opening ${file.name} …`, true);
-        app.send({ type: "open", name: file.name }, [await file.arrayBuffer()]);
-      }
+      else await asker.send(file);
     }
   }
   app.on("answer:opened", ({ name, layers, datasets, maps }) => {
@@ -38,7 +36,7 @@ function openFiles(app, el) {
     event.preventDefault();
     take([...event.dataTransfer.files]);
   });
-  return { choose: () => input.click(), take };
+  return { choose: () => input.click(), take, close: asker.close };
 }
 
 // The state that a file holds, null where it holds something else.
