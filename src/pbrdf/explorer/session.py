@@ -20,7 +20,7 @@ from pbrdf.explorer.state import StateError, read_state
 from pbrdf.explorer.uploads import MOST_BYTES
 from pbrdf.explorer.workspace import Workspace
 
-__all__ = ["REQUESTS", "VIEWS", "Emit", "Session", "prepare"]
+__all__ = ["REQUESTS", "VIEWS", "Emit", "Session", "prepared"]
 
 #: Sends a JSON object and buffers to the page, from any thread.
 Emit = Callable[[Mapping[str, Any], Sequence[bytes | memoryview]], None]
@@ -48,23 +48,14 @@ _MOST_WAITING = 64
 #: What a page is told of a fault that is not its own.
 _FAULT = "an error of the explorer; the terminal says more"
 
-#: One thread loads at a time: libraries that import each other in circles do not bear two.
-_loading = threading.Lock()
+_preparing = threading.Lock()
 _log = logging.getLogger(__name__)
 
 
-def prepare() -> None:
-    """Load what the first page asks for."""
-    with _loading:
-        catalogue()
-    for view in VIEWS.values():
-        _load(view)
-
-
-def _load(name: str) -> Any:
-    """A module of a view or a request."""
-    with _loading:
-        return import_module(name)
+def prepared() -> dict[str, Any]:
+    """The catalogue, put together once: whoever asks meanwhile waits for it."""
+    with _preparing:
+        return catalogue()
 
 
 class Session:
@@ -149,16 +140,14 @@ class Session:
     def _answer(self, content: dict[str, Any], buffers: Sequence[Any], turn: int) -> None:
         kind = content.get("type")
         if kind == "hello":
-            with _loading:
-                known = catalogue()
-            welcome = {"catalogue": known, "state": self.workspace.state(), "most_bytes": MOST_BYTES}
+            welcome = {"catalogue": prepared(), "state": self.workspace.state(), "most_bytes": MOST_BYTES}
             self.emit({"type": "welcome", **welcome}, [])
         elif kind == "draw":
             self._draw(content, turn)
         elif kind == "goodbye":  # a notebook shows the same widget again
             pass
         elif isinstance(kind, str) and kind in REQUESTS:
-            _load(REQUESTS[kind]).answer(content, buffers, self.workspace, self.emit)
+            import_module(REQUESTS[kind]).answer(content, buffers, self.workspace, self.emit)
         else:
             self.emit(error_answer(content, f"there is no request {str(kind)[:40]!r}"), [])
 
@@ -182,7 +171,7 @@ class Session:
             if self._closed.is_set():
                 return
             try:
-                header, buffers = _load(VIEWS[view]).draw(
+                header, buffers = import_module(VIEWS[view]).draw(
                     state, self.workspace, bool(content.get("dragging"))
                 )
             except PbrdfError as error:
