@@ -21,6 +21,7 @@ PARTS = (
     "application.js",
     "address.js",
     "controls.js",
+    "unsaid.js",
     "files.js",
     "views/hemisphere.js",
     "views/cuts.js",

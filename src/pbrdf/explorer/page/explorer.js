@@ -88,7 +88,7 @@ function render({ model, el }) {
   });
   app.on("connected", () => app.send({ type: "hello" }));
   app.send({ type: "hello" });
-  return () => { help.close(); app.end(); root.remove(); };
+  return () => { help.close(); files.close(); app.end(); root.remove(); };
 }
 
 // The panels and the views of a state.
