@@ -132,17 +132,20 @@ def main() -> None:
     # what libraries print goes to the terminal, not among the answers
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
-    jobs: queue.Queue[dict[str, Any]] = queue.Queue()
-    threading.Thread(target=_listen, args=(jobs,), daemon=True).start()
 
     def tell(message: dict[str, Any]) -> None:
         pickle.dump(message, answers)
         answers.flush()
 
+    # before anything is listened to: a job brings types of modules, and two threads cannot import these at once
+    import xarray  # noqa: F401
+
     import pbrdf.inversion.fit
     import pbrdf.report.numbers  # noqa: F401
     from pbrdf.errors import PbrdfError
 
+    jobs: queue.Queue[dict[str, Any]] = queue.Queue()
+    threading.Thread(target=_listen, args=(jobs,), daemon=True).start()
     while True:
         job = jobs.get()
         try:
