@@ -1,16 +1,13 @@
 """An explorer served in a thread, and Chromium to open it in."""
 
 import asyncio
+import concurrent.futures
 import threading
 
 import pytest
 
 import pbrdf
 from browser import chromium
-
-playwright = pytest.importorskip("playwright.sync_api")
-# WebGL2 without a graphics card
-FLAGS = ("--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 
 
 @pytest.fixture
@@ -50,16 +47,21 @@ def served():
         thread.join(10)
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture
+def apart():
+    """A function that calls another in a thread of its own: where Playwright is at work, its loop runs in this one."""
+
+    def call(function, *arguments):
+        with concurrent.futures.ThreadPoolExecutor(1) as pool:
+            return pool.submit(function, *arguments).result(60)
+
+    return call
+
+
+@pytest.fixture(scope="module")
 def chrome():
-    """Chromium without a window."""
-    program = chromium()
-    if program is None:
-        pytest.skip("no Chromium or Chrome on this machine (apt-get install chromium)")
-    with playwright.sync_playwright() as p:
-        browser = p.chromium.launch(executable_path=program, args=list(FLAGS))
+    with chromium() as browser:
         yield browser
-        browser.close()
 
 
 @pytest.fixture

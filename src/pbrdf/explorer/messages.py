@@ -8,13 +8,15 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NoReturn
 
 from pbrdf.errors import DataError
 
-__all__ = ["pack", "unpack"]
+__all__ = ["MOST_BUFFERS", "MOST_TEXT", "error_answer", "pack", "unpack"]
 
 _ALIGNMENT = 8
+#: Bytes of the JSON text, and number of buffers, of a message of the page, at most.
+MOST_TEXT, MOST_BUFFERS = 1 << 20, 64
 
 
 def pack(content: Mapping[str, Any], buffers: Sequence[bytes | memoryview] = ()) -> bytes:
@@ -36,20 +38,40 @@ def unpack(frame: bytes) -> tuple[dict[str, Any], list[memoryview]]:
     Raises
     ------
     DataError
-        If the frame is not one of :func:`pack`.
+        If the frame is not one of :func:`pack`, or its text or the number of its buffers is beyond all measure.
     """
     view = memoryview(frame)
     length = int.from_bytes(view[:4], "little")
     try:
-        content = json.loads(bytes(view[4 : 4 + length]))
+        if length > min(MOST_TEXT, len(view) - 4):
+            raise ValueError
+        content = json.loads(bytes(view[4 : 4 + length]), parse_constant=_no_number)
         lengths = content.pop("buffers", [])
+        if len(lengths) > MOST_BUFFERS:
+            raise ValueError
         at, buffers = 4 + length, []
         for size in lengths:
             at += -at % _ALIGNMENT
-            if not isinstance(size, int) or size < 0 or at + size > len(view):
+            if type(size) is not int or size < 0 or at + size > len(view):
                 raise ValueError
             buffers.append(view[at : at + size])
             at += size
     except (ValueError, AttributeError, TypeError, RecursionError):
         raise DataError("a message that is no frame of the explorer") from None
     return content, buffers
+
+
+def error_answer(request: Mapping[str, Any], text: str, place: str = "") -> dict[str, Any]:
+    """The answer to a request that has none, in words; ``place`` is the path in the state of what is at fault."""
+    about, number = request.get("type"), request.get("id")
+    return {
+        "type": "error",
+        "id": number if isinstance(number, int | str) else None,
+        "about": about if isinstance(about, str) else None,
+        "place": place,
+        "text": text,
+    }
+
+
+def _no_number(name: str) -> NoReturn:
+    raise ValueError(f"{name} is no number of JSON")

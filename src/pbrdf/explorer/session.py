@@ -1,5 +1,7 @@
 """One page at work: its requests are answered in order by one thread, and where pictures are asked for again before
 they are drawn, only the latest request is drawn.
+
+Several pages have a thread each; Dr.Jit evaluates in several threads at once.
 """
 
 from __future__ import annotations
@@ -13,7 +15,9 @@ from typing import Any
 
 from pbrdf.errors import PbrdfError
 from pbrdf.explorer.catalogue import catalogue
+from pbrdf.explorer.messages import error_answer
 from pbrdf.explorer.state import StateError, read_state
+from pbrdf.explorer.uploads import MOST_BYTES
 from pbrdf.explorer.workspace import Workspace
 
 __all__ = ["REQUESTS", "VIEWS", "Emit", "Session"]
@@ -24,16 +28,25 @@ Emit = Callable[[Mapping[str, Any], Sequence[bytes | memoryview]], None]
 VIEWS = {
     "hemisphere": "pbrdf.explorer.views.hemisphere",
     "cuts": "pbrdf.explorer.views.cuts",
+    "mueller": "pbrdf.explorer.views.mueller",
+    "sphere": "pbrdf.explorer.views.sphere",
+    "polar": "pbrdf.explorer.views.polar",
 }
 #: Modules that answer the other requests, by the request's type; each has
 #: ``answer(request, buffers, workspace, emit)``.
 REQUESTS: dict[str, str] = {
-    "data": "pbrdf.explorer.points",
-    "fit": "pbrdf.explorer.fitting",
     "cancel_fit": "pbrdf.explorer.fitting",
+    "data": "pbrdf.explorer.points",
+    "export": "pbrdf.explorer.exports",
+    "fit": "pbrdf.explorer.fitting",
+    "open": "pbrdf.explorer.uploads",
+    "previews": "pbrdf.explorer.previews",
+    "read_state": "pbrdf.explorer.reading",
 }
 #: Requests that wait, at most; a page waits for answers, so more come from no page of ours.
 _MOST_WAITING = 64
+#: What a page is told of a fault that is not its own.
+_FAULT = "an error of the explorer; the terminal says more"
 
 _log = logging.getLogger(__name__)
 
@@ -46,74 +59,110 @@ class Session:
     workspace
         What is open: data, maps, the state to begin with.
     emit
-        Sends an answer to the page; called from the session's thread and those of fits.
+        Sends an answer to the page; called from the session's thread and those of uploads and fits, never after
+        :meth:`close`.
     """
 
     def __init__(self, workspace: Workspace, emit: Emit) -> None:
         self.workspace = workspace
-        self.emit = emit
-        self._waiting: queue.Queue[tuple[dict[str, Any], Sequence[Any]] | None] = queue.Queue(_MOST_WAITING)
+        self._send = emit
+        self._closed = threading.Event()
+        self._waiting: queue.Queue[tuple[dict[str, Any], Sequence[Any], int] | None] = queue.Queue(
+            _MOST_WAITING
+        )
         self._newest_draw = 0
         self._thread = threading.Thread(target=self._work, daemon=True, name="pbrdf explorer")
         self._thread.start()
 
+    def emit(self, content: Mapping[str, Any], buffers: Sequence[bytes | memoryview]) -> None:
+        """Send an answer, from any thread; nothing where the page has gone."""
+        if self._closed.is_set():
+            return
+        try:
+            self._send(content, buffers)
+        except Exception:
+            # a page that goes while its picture is drawn takes what sends to it away
+            if not self._closed.is_set():
+                _log.exception("the explorer could not send %s", content.get("type"))
+
     def receive(self, content: dict[str, Any], buffers: Sequence[Any] = ()) -> None:
         """Take a request of the page; the answers come through ``emit``."""
+        if self._closed.is_set():
+            return
         if content.get("type") == "draw":
             self._newest_draw += 1
-            content["_turn"] = self._newest_draw
         try:
-            self._waiting.put_nowait((content, buffers))
+            self._waiting.put_nowait((content, buffers, self._newest_draw))
         except queue.Full:
-            self._emit_error(content, "", "too many requests at once: wait for the answers")
+            self.emit(error_answer(content, "too many requests at once: wait for the answers"), [])
 
     def wait(self) -> None:
         """Return when everything that was received has been answered."""
         self._waiting.join()
 
     def close(self) -> None:
-        """End the thread and what it started."""
+        """End the thread, after the answer that it is at, and what it started; what waits is not answered."""
+        if self._closed.is_set():
+            return
+        self._closed.set()
         self.workspace.close()
-        self._waiting.put(None)
+        try:
+            while True:
+                self._waiting.get_nowait()
+                self._waiting.task_done()
+        except queue.Empty:
+            self._waiting.put(None)
 
     def _work(self) -> None:
         while (item := self._waiting.get()) is not None:
-            content, buffers = item
+            content, buffers, turn = item
             try:
-                self._answer(content, buffers)
+                self._answer(content, buffers, turn)
             except StateError as error:
-                self._emit_error(content, error.place, str(error))
+                self.emit(error_answer(content, str(error), error.place), [])
             except PbrdfError as error:
-                self._emit_error(content, "", str(error))
+                self.emit(error_answer(content, str(error)), [])
             except Exception:
-                _log.exception("the explorer could not answer %s", content.get("type"))
-                self._emit_error(content, "", "an error of the explorer; the terminal says more")
+                if not self._closed.is_set():
+                    _log.exception("the explorer could not answer %r", content.get("type"))
+                self.emit(error_answer(content, _FAULT), [])
             finally:
                 self._waiting.task_done()
+        self._waiting.task_done()
 
-    def _emit_error(self, content: Mapping[str, Any], place: str, text: str) -> None:
-        answer = {"type": "error", "id": content.get("id"), "about": content.get("type")}
-        self.emit({**answer, "place": place, "text": text}, [])
-
-    def _answer(self, content: dict[str, Any], buffers: Sequence[Any]) -> None:
+    def _answer(self, content: dict[str, Any], buffers: Sequence[Any], turn: int) -> None:
         kind = content.get("type")
         if kind == "hello":
-            self.emit({"type": "welcome", "catalogue": catalogue(), "state": self.workspace.state()}, [])
+            welcome = {"catalogue": catalogue(), "state": self.workspace.state(), "most_bytes": MOST_BYTES}
+            self.emit({"type": "welcome", **welcome}, [])
         elif kind == "draw":
-            self._draw(content)
-        elif kind in REQUESTS:
-            import_module(REQUESTS[str(kind)]).answer(content, buffers, self.workspace, self.emit)
+            self._draw(content, turn)
+        elif kind == "goodbye":  # a notebook shows the same widget again
+            pass
+        elif isinstance(kind, str) and kind in REQUESTS:
+            import_module(REQUESTS[kind]).answer(content, buffers, self.workspace, self.emit)
         else:
-            self._emit_error(content, "", f"there is no request {kind!r}")
+            self.emit(error_answer(content, f"there is no request {str(kind)[:40]!r}"), [])
 
-    def _draw(self, content: dict[str, Any]) -> None:
+    def _draw(self, content: dict[str, Any], turn: int) -> None:
         """Draw the views that are asked for; the last answer says so."""
-        if content["_turn"] != self._newest_draw:
-            self.emit({"type": "superseded", "id": content.get("id")}, [])
+        number = error_answer(content, "")["id"]
+        if turn != self._newest_draw:
+            self.emit({"type": "superseded", "id": number}, [])
             return
         state = read_state(content.get("state"))
-        views = [view for view in content.get("views", []) if view in VIEWS]
+        asked = content.get("views")
+        known = (
+            [view for view in asked if isinstance(view, str) and view in VIEWS]
+            if isinstance(asked, list)
+            else []
+        )
+        views = list(dict.fromkeys(known))
+        if not views:
+            raise StateError("views", f"no view is asked for: choose of {', '.join(VIEWS)}")
         for view in views:
+            if self._closed.is_set():
+                return
             try:
                 header, buffers = import_module(VIEWS[view]).draw(
                     state, self.workspace, bool(content.get("dragging"))
@@ -121,5 +170,8 @@ class Session:
             except PbrdfError as error:
                 place = error.place if isinstance(error, StateError) else ""
                 header, buffers = {"error": str(error), "place": place}, []
-            answer = {"type": "picture", "id": content.get("id"), "view": view, "last": view == views[-1]}
+            except Exception:
+                _log.exception("the explorer could not draw %s", view)
+                header, buffers = {"error": _FAULT, "place": ""}, []
+            answer = {"type": "picture", "id": number, "view": view, "last": view == views[-1]}
             self.emit({**answer, **header}, buffers)

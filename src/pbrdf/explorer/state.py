@@ -15,7 +15,16 @@ from pbrdf.models.base import PARTS, Model
 from pbrdf.models.evaluation import check_incident
 from pbrdf.models.registry import MODELS
 
-__all__ = ["QUANTITIES", "VERSION", "Layer", "Light", "State", "StateError", "read_state"]
+__all__ = [
+    "MOST_LAYERS",
+    "QUANTITIES",
+    "VERSION",
+    "Layer",
+    "Light",
+    "State",
+    "StateError",
+    "read_state",
+]
 
 #: Of the layout of the object; one of another version is refused in words.
 VERSION = 1
@@ -52,6 +61,10 @@ class Layer:
     model: Model
     shown: bool = True
 
+    def to_dict(self) -> dict[str, Any]:
+        """The layer as JSON, complete."""
+        return {"name": self.name, "shown": self.shown, **self.model.to_dict()}
+
 
 @dataclass(frozen=True)
 class State:
@@ -82,6 +95,19 @@ class State:
     quantities: tuple[str, ...] = ("intensity", "dolp")
     part: str = "total"
     settings: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The state as JSON, complete: parameters and options that were left out have their defaults."""
+        return {
+            "version": VERSION,
+            "layers": [layer.to_dict() for layer in self.layers],
+            "active": self.active,
+            "compare": self.compare,
+            "light": {"theta_i": self.light.theta_i, "stokes": list(self.light.stokes)},
+            "quantities": list(self.quantities),
+            "part": self.part,
+            "settings": {name: dict(value) for name, value in self.settings.items()},
+        }
 
     @property
     def shown(self) -> Layer:

@@ -29,17 +29,36 @@ function unpack(frame) {
   return [content, buffers];
 }
 
+// Milliseconds before a lost connection is tried again, at first and in the end.
+const SOON = 500, LATE = 8000;
+
 // What AnyWidget gives a module: values by name and custom messages.
 class SocketModel {
   constructor(address) {
     this.listeners = new Map();
     this.values = new Map();
     this.waiting = [];
-    this.socket = new WebSocket(address);
+    this.address = address;
+    this.pause = SOON;
+    this.connect();
+  }
+  // A lost connection is tried again, at first soon; what was to be sent meanwhile is not: the page asks anew.
+  connect() {
+    const again = Boolean(this.socket);
+    this.socket = new WebSocket(this.address);
     this.socket.binaryType = "arraybuffer";
-    this.socket.onopen = () => { this.waiting.forEach(f => this.socket.send(f)); this.waiting = []; };
+    this.socket.onopen = () => {
+      this.pause = SOON;
+      const waiting = this.waiting;
+      this.waiting = [];
+      if (again) this.tell("connected"); else waiting.forEach(f => this.socket.send(f));
+    };
     this.socket.onmessage = event => this.tell("msg:custom", ...unpack(event.data));
-    this.socket.onclose = () => this.tell("disconnected");
+    this.socket.onclose = () => {
+      this.tell("disconnected");
+      setTimeout(() => this.connect(), this.pause);
+      this.pause = Math.min(2 * this.pause, LATE);
+    };
   }
   get(name) { return this.values.get(name); }
   set(name, value) { this.values.set(name, value); this.tell(`change:${name}`); }
@@ -53,9 +72,9 @@ class SocketModel {
   }
 }
 
-const token = new URLSearchParams(location.search).get("token") ?? "";
-const scheme = location.protocol === "https:" ? "wss" : "ws";
-const model = new SocketModel(`${scheme}://${location.host}/socket?token=${encodeURIComponent(token)}`);
+// the token stands in a cookie now: out of the address, which may be shown and sent
+if (new URLSearchParams(location.search).has("token")) history.replaceState(null, "", location.pathname + location.hash);
+const model = new SocketModel(`ws://${location.host}/socket`);
 // the state of the page stands in the address: a reload, or a colleague with the same data, sees the same
 model.set("address", true);
 explorer.render({ model, el: document.getElementById("explorer") });
