@@ -104,7 +104,7 @@ def test_points_are_switched_off_by_keyboard_and_a_fit_can_be_undone(served, pag
     table = page.locator(".fitting .estimates").inner_text().replace("−", "-")
     estimate = result.estimates["sigma"]
     assert f"{estimate.value:.4f}"[:5] in table and "±" in table
-    assert page.locator(".fitting .correlation td").count() == result.correlation.size
+    assert page.locator(".fitting .correlation tbody td").count() == result.correlation.size
     text = page.locator(".fitting").inner_text()
     assert result.verdict().sentence in text
     assert "held out: group=3 (21 geometries)" in text
