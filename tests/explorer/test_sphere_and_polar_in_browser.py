@@ -15,7 +15,8 @@ pytestmark = pytest.mark.slow
 BALL, POLAR = "article[aria-label='Lit ball'] canvas", "article[aria-label='Polar surface'] canvas"
 #: Colours of places of a canvas, from its middle in half widths, x to the right and y up; in bytes.
 READ = """([selector, places]) => {
-    const canvas = document.querySelector(selector), copy = document.createElement("canvas"), pen = copy.getContext("2d");
+    const canvas = document.querySelector(selector), copy = document.createElement("canvas");
+    const pen = copy.getContext("2d");
     copy.width = canvas.width;
     copy.height = canvas.height;
     pen.drawImage(canvas, 0, 0);

@@ -312,7 +312,13 @@ VIEWS.push({
     canvas.addEventListener("pointerleave", event => { if (!grip) { readout.textContent = "\u00a0"; drop(event); } });
     readout.textContent = "\u00a0";
     keepSharp(canvas, redraw, 1200);
-    app.on("state", update);
+    // a moved slider has its picture to come; what stands is drawn again where the ball's settings are others
+    let followed = "";
+    app.on("state", () => {
+      const now = JSON.stringify(settings());
+      if (now !== followed) update();
+      followed = now;
+    });
     return {
       show(content, buffers) {
         header = content;
