@@ -37,10 +37,12 @@ function ballMap(size, rows, rim) {
   if (ballMaps.has(key)) return ballMaps.get(key);
   if (ballMaps.size > 3) ballMaps.clear();
   const scale = 2 * BALL_REACH / size, most = size * size;
-  const map = { scale, pixel: new Uint32Array(most), row: new Float32Array(most), turn: new Float32Array(most), x: new Float32Array(most), y: new Float32Array(most), z: new Float32Array(most), rim: [] };
+  const map = { scale, pixel: new Uint32Array(most), row: new Float32Array(most), turn: new Float32Array(most),
+    x: new Float32Array(most), y: new Float32Array(most), z: new Float32Array(most), rim: [] };
   let count = 0;
   for (let j = 0; j < size; j++) for (let i = 0; i < size; i++) {
-    const x = (i + 0.5 - size / 2) * scale, y = (size / 2 - j - 0.5) * scale, radius = Math.hypot(x, y), cover = (1 - radius) / scale + 0.5;
+    const x = (i + 0.5 - size / 2) * scale, y = (size / 2 - j - 0.5) * scale, radius = Math.hypot(x, y),
+      cover = (1 - radius) / scale + 0.5;
     if (cover <= 0) continue;
     const zenith = Math.asin(Math.min(radius, 1));
     map.pixel[count] = j * size + i;
@@ -78,7 +80,8 @@ function ballCorners(map, columns, azimuth) {
 // A number between four corners of a grid, `step` numbers a point.
 function blended(values, corner, columns, wr, wc, step = 1, offset = 0) {
   const at = corner * step + offset, below = at + columns * step;
-  const upper = values[at] + (values[at + step] - values[at]) * wc, lower = values[below] + (values[below + step] - values[below]) * wc;
+  const upper = values[at] + (values[at + step] - values[at]) * wc,
+    lower = values[below] + (values[below + step] - values[below]) * wc;
   return upper + (lower - upper) * wr;
 }
 
@@ -99,9 +102,11 @@ VIEWS.push({
   name: "sphere",
   title: "Lit ball",
   build(place, app) {
-    const canvas = element("canvas", { width: 450, height: 450, class: "ball", role: "img", "aria-label": "A lit ball as a polarisation camera sees it" });
+    const canvas = element("canvas", { width: 450, height: 450, class: "ball", role: "img",
+      "aria-label": "A lit ball as a polarisation camera sees it" });
     const pen = canvas.getContext("2d");
-    const tables = Object.fromEntries(Object.entries(app.catalogue.colours).map(([name, text]) => [name, decoded(text)]));
+    const tables = Object.fromEntries(Object.entries(app.catalogue.colours).map(([name, text]) =>
+      [name, decoded(text)]));
     let header = null, fields = [], polarisers = null, handled = false, image = null;
 
     const settings = () => ({ mode: "radiance", polariser: 0, exposure: 0, ...app.state?.settings.sphere });
@@ -117,21 +122,29 @@ VIEWS.push({
     const light = (values, dragging) => set({ light: { ...lamp(), ...values } }, dragging, ["sphere"]);
 
     const slider = (name, symbol, about, unit, lower, upper, set) => {
-      const row = sliderRow({ name: `sphere-${name}`, symbol, about, unit, lower, upper, least: lower, most: upper }, set);
+      const row = sliderRow({ name: `sphere-${name}`, symbol, about, unit, lower, upper, least: lower, most: upper },
+        set);
       row.node.dataset.place = `settings.sphere.${name}`;
       return row;
     };
-    const mode = choiceRow("What the ball shows", Object.entries(BALL_MODES).map(([value, { text, title }]) => ({ value, text, title })), value => show("mode", value));
-    const dial = slider("polariser", "α", "polariser, from level", "°", 0, 180, (value, dragging) => show("polariser", value, dragging));
-    const exposure = slider("exposure", "EV", "exposure", "stops", -8, 8, (value, dragging) => show("exposure", value, dragging));
-    const polar = slider("light.polar", "θ", "lamp, from the camera", "°", 0, 180, (value, dragging) => light({ polar: value }, dragging));
-    const azimuth = slider("light.azimuth", "ψ", "lamp, around the ball from the right", "°", 0, 360, (value, dragging) => light({ azimuth: value }, dragging));
+    const mode = choiceRow("What the ball shows", Object.entries(BALL_MODES).map(([value, { text, title }]) =>
+      ({ value, text, title })), value => show("mode", value));
+    const dial = slider("polariser", "α", "polariser, from level", "°", 0, 180, (value, dragging) =>
+      show("polariser", value, dragging));
+    const exposure = slider("exposure", "EV", "exposure", "stops", -8, 8, (value, dragging) =>
+      show("exposure", value, dragging));
+    const polar = slider("light.polar", "θ", "lamp, from the camera", "°", 0, 180, (value, dragging) =>
+      light({ polar: value }, dragging));
+    const azimuth = slider("light.azimuth", "ψ", "lamp, around the ball from the right", "°", 0, 360,
+      (value, dragging) => light({ azimuth: value }, dragging));
     const legend = new ColourLegend();
     const readout = element("p", { class: "read" });
     place.append(
       mode.node, canvas, legend.node, readout, dial.node, exposure.node,
-      element("details", { class: "elements" }, element("summary", {}, "Lamp: drag on the ball, or here"), polar.node, azimuth.node,
-        element("p", { class: "about" }, "Angles of polarisation are those of the picture: 0° is level, counterclockwise. Of polarised light p lies in the plane of lamp and camera.")),
+      element("details", { class: "elements" }, element("summary", {}, "Lamp: drag on the ball, or here"), polar.node,
+        azimuth.node,
+        element("p", { class: "about" }, "Angles of polarisation are those of the picture: 0° is level, ",
+          "counterclockwise. Of polarised light p lies in the plane of lamp and camera.")),
     );
 
     function range() {
@@ -145,10 +158,13 @@ VIEWS.push({
     function scalars(values, { mode, polariser }) {
       const count = values.length / 4, found = new Float32Array(count);
       // the dial stands between two of the polarisers at most by rounding
-      const at = 4 * Math.round(polariser % 180 / 180 * (polarisers.length / 4 - 1)), [a, b, c, d] = polarisers.subarray(at, at + 4);
+      const at = 4 * Math.round(polariser % 180 / 180 * (polarisers.length / 4 - 1)),
+        [a, b, c, d] = polarisers.subarray(at, at + 4);
       for (let k = 0; k < count; k++) {
         const L = values[4 * k], q = values[4 * k + 1], u = values[4 * k + 2], v = values[4 * k + 3];
-        found[k] = mode === "radiance" ? L : mode === "polariser" ? L * (a + b * q + c * u + d * v) : mode === "dolp" ? Math.sqrt(q * q + u * u) : v;
+        if (mode === "radiance") found[k] = L;
+        else if (mode === "polariser") found[k] = L * (a + b * q + c * u + d * v);
+        else found[k] = mode === "dolp" ? Math.sqrt(q * q + u * u) : v;
       }
       return found;
     }
@@ -161,7 +177,7 @@ VIEWS.push({
       const tone = !both && ["radiance", "polariser"].includes(chosen.mode), gain = Math.PI * 2 ** chosen.exposure;
       const name = chosen.mode === "aolp" ? "cyclic" : both || chosen.mode === "circular" ? "signed" : "sequential";
       const table = tone ? greyLevels : levelTable(app.catalogue.colours[name]);
-      const [low, high] = tone ? [0, TONES / gain] : range(), scale = (table.length - 1) / (high - low), last = table.length - 1;
+      const [low, high] = tone ? [0, TONES / gain] : range(), last = table.length - 1, scale = last / (high - low);
       if (image?.width !== size) image = pen.createImageData(size, size);
       const pixels = new Uint32Array(image.data.buffer), { pixel } = map;
       ballCorners(map, columns, header.lamp[1]);
@@ -171,14 +187,17 @@ VIEWS.push({
         const [values, others] = fields;
         for (let k = 0; k < count; k++) {
           const wr = row[k] - (row[k] | 0), wc = along[k];
-          let q = blended(values, corner[k], columns, wr, wc, 4, 1), u = blended(values, corner[k], columns, wr, wc, 4, 2), dolp = Math.sqrt(q * q + u * u);
+          let q = blended(values, corner[k], columns, wr, wc, 4, 1),
+            u = blended(values, corner[k], columns, wr, wc, 4, 2), dolp = Math.sqrt(q * q + u * u);
           if (both) {
-            const p = blended(others, corner[k], columns, wr, wc, 4, 1), v = blended(others, corner[k], columns, wr, wc, 4, 2);
+            const p = blended(others, corner[k], columns, wr, wc, 4, 1),
+              v = blended(others, corner[k], columns, wr, wc, 4, 2);
             dolp = Math.min(dolp, Math.sqrt(p * p + v * v));
             [q, u] = [q * p + u * v, u * p - q * v];
           }
           const fade = Math.min(dolp / 0.01, 1), colour = table[(0.5 * Math.atan2(u, q) - low) * scale + 0.5 | 0];
-          pixels[pixel[k]] = fade < 1 ? towardsGrey(colour, GREY.unpolarised, 1 - fade * fade * (3 - 2 * fade)) : colour;
+          const grey = 1 - fade * fade * (3 - 2 * fade);
+          pixels[pixel[k]] = fade < 1 ? towardsGrey(colour, GREY.unpolarised, grey) : colour;
         }
       } else {
         const shown = scalars(fields[0], chosen);
@@ -188,7 +207,8 @@ VIEWS.push({
         }
         for (let k = 0; k < shown.length; k++) shown[k] = (shown[k] - low) * scale + 0.5;
         for (let k = 0; k < count; k++) {
-          const at = corner[k], below = at + columns, wc = along[k], r = row[k], upper = shown[at] + (shown[at + 1] - shown[at]) * wc;
+          const at = corner[k], below = at + columns, wc = along[k], r = row[k],
+            upper = shown[at] + (shown[at + 1] - shown[at]) * wc;
           const level = upper + (shown[below] + (shown[below + 1] - shown[below]) * wc - upper) * (r - (r | 0)) | 0;
           pixels[pixel[k]] = table[level < 0 ? 0 : level > last ? last : level];
         }
@@ -214,7 +234,8 @@ VIEWS.push({
 
     // The polariser, with stripes along the axis that passes.
     function drawDisc(angle) {
-      const [x, y] = placed(DISC.x, DISC.y), radius = DISC.radius * canvas.width / 2 / BALL_REACH, ratio = canvas.width / Math.max(canvas.clientWidth, 1);
+      const [x, y] = placed(DISC.x, DISC.y), radius = DISC.radius * canvas.width / 2 / BALL_REACH,
+        ratio = canvas.width / Math.max(canvas.clientWidth, 1);
       pen.save();
       pen.translate(x, y);
       pen.rotate(-angle * Math.PI / 180);
@@ -253,26 +274,33 @@ VIEWS.push({
       mode.show(chosen.mode);
       dial.node.hidden = chosen.mode !== "polariser";
       exposure.node.hidden = fields.length > 1 || !["radiance", "polariser"].includes(chosen.mode);
-      for (const [row, value] of [[dial, chosen.polariser], [exposure, chosen.exposure], [polar, p], [azimuth, a]]) row.show(value);
+      dial.show(chosen.polariser);
+      exposure.show(chosen.exposure);
+      polar.show(p);
+      azimuth.show(a);
       redraw();
     }
 
     const pointed = event => {
       const box = canvas.getBoundingClientRect();
-      return [(2 * (event.clientX - box.left) / box.width - 1) * BALL_REACH, (1 - 2 * (event.clientY - box.top) / box.height) * BALL_REACH];
+      return [(2 * (event.clientX - box.left) / box.width - 1) * BALL_REACH,
+        (1 - 2 * (event.clientY - box.top) / box.height) * BALL_REACH];
     };
 
     function read(event) {
       const [x, y] = pointed(event), radius = Math.hypot(x, y);
       if (!header || radius > 1) { readout.textContent = "\u00a0"; return; }
       const turn = (Math.atan2(y, x) / (2 * Math.PI) - header.lamp[1] / 360 + 3) % 1, [rows, columns] = header.shape;
-      const row = Math.min(Math.asin(radius) / header.rim, 1 - 1e-6) * (rows - 1), r0 = row | 0, column = turn * (columns - 1), c0 = Math.min(column | 0, columns - 2);
+      const row = Math.min(Math.asin(radius) / header.rim, 1 - 1e-6) * (rows - 1), r0 = row | 0,
+        column = turn * (columns - 1), c0 = Math.min(column | 0, columns - 2);
       readout.textContent = fields.map((values, i) => {
-        const [L, q, u, v] = [0, 1, 2, 3].map(offset => blended(values, r0 * columns + c0, columns, row - r0, column - c0, 4, offset));
+        const [L, q, u, v] = [0, 1, 2, 3].map(offset =>
+          blended(values, r0 * columns + c0, columns, row - r0, column - c0, 4, offset));
         const angle = Math.atan2(u, q) / 2 * 180 / Math.PI;
         const name = fields.length > 1 ? `${header.models[i]}: ` : "";
         if (L <= 0) return `${name}in the shadow`;
-        return `${name}${written(L)} sr⁻¹, DoLP ${written(100 * Math.hypot(q, u))} %, AoLP ${written(Number(angle.toFixed(1)))}°, V/I ${written(100 * v)} %`;
+        const dolp = written(100 * Math.hypot(q, u)), aolp = written(Number(angle.toFixed(1)));
+        return `${name}${written(L)} sr⁻¹, DoLP ${dolp} %, AoLP ${aolp}°, V/I ${written(100 * v)} %`;
       }).join("; ");
     }
 
@@ -304,7 +332,8 @@ VIEWS.push({
       grip.moved ||= Math.hypot(event.clientX - grip.x, event.clientY - grip.y) > 4;
       if (!grip.moved) return;
       const [x, y] = pointed(event);
-      const polar = 2 * Math.asin(Math.min(Math.hypot(x, y), 1)) * 180 / Math.PI, around = Math.atan2(y, x) * 180 / Math.PI;
+      const polar = 2 * Math.asin(Math.min(Math.hypot(x, y), 1)) * 180 / Math.PI,
+        around = Math.atan2(y, x) * 180 / Math.PI;
       light({ polar: Number(polar.toFixed(1)), azimuth: Number(((around + 360) % 360).toFixed(1)) }, true);
     });
     canvas.addEventListener("pointerup", drop);
