@@ -89,8 +89,12 @@ class FitProcess:
         Raises
         ------
         FitError
-            If another fit is running.
+            If another fit is running, or the model is none that another process can be told of.
         """
+        try:
+            content = pickle.dumps(job)
+        except (pickle.PicklingError, AttributeError, TypeError) as error:
+            raise FitError(f"this model cannot be fitted by a process beside: {error}") from None
         with self._lock:
             if self._job is not None:
                 raise FitError("a fit is running: wait for it, or cancel it")
@@ -98,7 +102,7 @@ class FitProcess:
             if self._child is None:
                 raise FitError("the page is closed")
             self._job = _Job(self._child, tell)
-            threading.Thread(target=self._follow, args=(self._job, job), daemon=True).start()
+            threading.Thread(target=self._follow, args=(self._job, content), daemon=True).start()
 
     def cancel(self) -> bool:
         """End the fit that is running at once; False if there is none."""
@@ -128,7 +132,7 @@ class FitProcess:
                 with suppress(OSError):
                     pipe.close()
 
-    def _follow(self, job: _Job, content: dict[str, Any]) -> None:
+    def _follow(self, job: _Job, content: bytes) -> None:
         """Hand the job over and tell what comes of it."""
         message: dict[str, Any] | None = None
         assert job.child.stdin is not None and job.child.stdout is not None

@@ -20,7 +20,7 @@ from pbrdf.explorer.state import StateError, read_state
 from pbrdf.explorer.uploads import MOST_BYTES
 from pbrdf.explorer.workspace import Workspace
 
-__all__ = ["REQUESTS", "VIEWS", "Emit", "Session"]
+__all__ = ["REQUESTS", "VIEWS", "Emit", "Session", "prepared"]
 
 #: Sends a JSON object and buffers to the page, from any thread.
 Emit = Callable[[Mapping[str, Any], Sequence[bytes | memoryview]], None]
@@ -48,7 +48,14 @@ _MOST_WAITING = 64
 #: What a page is told of a fault that is not its own.
 _FAULT = "an error of the explorer; the terminal says more"
 
+_preparing = threading.Lock()
 _log = logging.getLogger(__name__)
+
+
+def prepared() -> dict[str, Any]:
+    """The catalogue, put together once: whoever asks meanwhile waits for it."""
+    with _preparing:
+        return catalogue()
 
 
 class Session:
@@ -133,7 +140,7 @@ class Session:
     def _answer(self, content: dict[str, Any], buffers: Sequence[Any], turn: int) -> None:
         kind = content.get("type")
         if kind == "hello":
-            welcome = {"catalogue": catalogue(), "state": self.workspace.state(), "most_bytes": MOST_BYTES}
+            welcome = {"catalogue": prepared(), "state": self.workspace.state(), "most_bytes": MOST_BYTES}
             self.emit({"type": "welcome", **welcome}, [])
         elif kind == "draw":
             self._draw(content, turn)

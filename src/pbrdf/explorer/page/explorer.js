@@ -88,7 +88,7 @@ function render({ model, el }) {
   });
   app.on("connected", () => app.send({ type: "hello" }));
   app.send({ type: "hello" });
-  return () => { help.close(); app.end(); root.remove(); };
+  return () => { help.close(); files.close(); app.end(); root.remove(); };
 }
 
 // The panels and the views of a state.
@@ -249,6 +249,7 @@ function helpOf(inPage) {
   const keys = [
     ["Tab, Shift+Tab", "to the next or previous control"], ["← →", "move a slider by a thousandth"], ["Page Up, Page Down", "by a tenth"], ["Home, End", "to its ends"],
     ["↑ ↓ in a number", "as the slider's arrows"], ["Enter, Escape in a number", "take it, give it up"], ["Ctrl+Z, Ctrl+Shift+Z", "undo, redo"],
+    ["← → in the curves", "from point to point, or along them"], ["Space in the curves", "switch the point off or on"],
   ];
   const dialog = element("dialog", { class: "help", "aria-label": "Help" },
     element("header", {}, element("h2", {}, "Help"), iconButton("remove", "Close the help", () => dialog.close())),
