@@ -6,9 +6,11 @@ Several pages have a thread each; Dr.Jit evaluates in several threads at once.
 
 from __future__ import annotations
 
+import atexit
 import logging
 import queue
 import threading
+import weakref
 from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 from typing import Any
@@ -48,6 +50,9 @@ _MOST_WAITING = 64
 #: What a page is told of a fault that is not its own.
 _FAULT = "an error of the explorer; the terminal says more"
 
+#: Seconds that the end of Python waits for a session's thread: one that it ends amid Dr.Jit takes the process down.
+_TO_END = 2.0
+_at_work: weakref.WeakSet[Session] = weakref.WeakSet()
 _preparing = threading.Lock()
 _log = logging.getLogger(__name__)
 
@@ -56,6 +61,13 @@ def prepared() -> dict[str, Any]:
     """The catalogue, put together once: whoever asks meanwhile waits for it."""
     with _preparing:
         return catalogue()
+
+
+@atexit.register
+def _close_all() -> None:
+    for session in list(_at_work):
+        session.close()
+        session._thread.join(_TO_END)
 
 
 class Session:
@@ -80,6 +92,7 @@ class Session:
         self._newest_draw = 0
         self._thread = threading.Thread(target=self._work, daemon=True, name="pbrdf explorer")
         self._thread.start()
+        _at_work.add(self)
 
     def emit(self, content: Mapping[str, Any], buffers: Sequence[bytes | memoryview]) -> None:
         """Send an answer, from any thread; nothing where the page has gone."""
