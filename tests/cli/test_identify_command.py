@@ -224,3 +224,17 @@ def test_tables_of_labels_that_are_refused(refused, tmp_path):
     assert "line 2: absent.csv: there is no such file" in table("material,file\nwhite,absent.csv\n")
     (tmp_path / "labels.csv").unlink()
     assert "labels.csv: cannot be read" in refused("identify", "--calibrate", "labels.csv")
+
+
+@pytest.mark.slow
+def test_many_wavelengths_are_a_choice(refused, run, tmp_path):
+    few = pbrdf.open_experiment("white").isel(geometry=FEW * 2)
+    many = few.assign_coords(wavelength=("geometry", 400.0 + 50.0 * np.arange(8)))
+    pbrdf.write(many, tmp_path / "many.nc")
+    text = refused("identify", "many.nc")
+    assert "there are 8 wavelengths, 400 … 750 nm, and each material of the library is of one" in text
+    assert "--wavelength 600" in text
+    assert "--select wavelength=400:750" in text
+    assert run("identify", "many.nc", "--wavelength", 450, "-q").output.startswith("many.nc: ")
+    (tmp_path / "labels.csv").write_text("file,material\nmany.nc,white\n", encoding="utf-8")
+    assert "there are 8 wavelengths" in refused("identify", "--calibrate", "labels.csv")

@@ -13,10 +13,25 @@ import typer
 
 from pbrdf.cli.command_line import command_line
 from pbrdf.cli.console import output_console, progress_bar, warn
-from pbrdf.cli.options import Backend, noise_option, output_option, quiet_option, with_reading_options
+from pbrdf.cli.options import (
+    Backend,
+    library_option,
+    noise_option,
+    output_option,
+    quiet_option,
+    with_reading_options,
+)
 from pbrdf.cli.reading import Reading
-from pbrdf.cli.specimens import BUNDLED, open_library, open_measurement, open_pixels
+from pbrdf.cli.specimens import (
+    BUNDLED,
+    Measurement,
+    library_file,
+    open_library,
+    open_measurement,
+    open_pixels,
+)
 from pbrdf.cli.values import numbers
+from pbrdf.cli.wavelengths import require_choice
 from pbrdf.errors import DataError, FitError, PbrdfError
 
 if TYPE_CHECKING:
@@ -44,10 +59,7 @@ def identify(
     ] = None,
     *,
     reading: Reading,
-    library: Annotated[
-        Path | None,
-        typer.Option(help="The library's file, see `pbrdf library`.", metavar="FILE", show_default=BUNDLED),
-    ] = None,
+    library: Annotated[Path | None, library_option()] = None,
     confidence: Annotated[
         float, typer.Option(help="How often the set is to hold the true material, between 0 and 1.")
     ] = 0.95,
@@ -138,8 +150,8 @@ def identify(
         raise PbrdfError("--angle 0: leave it out where the angle is exact")
     common = numbers(prior or (), "--prior", "white=0.5")
     folders = _folders(sources, output)
-    opened = open_library(library)
-    name = str(library or BUNDLED)
+    file = library_file(library)
+    opened, name = open_library(file), str(file or BUNDLED)
     try:
         check_request(opened, confidence)
         shares(opened, common)
@@ -180,7 +192,7 @@ def identify(
         quiet,
     )
     if calibrate is not None:
-        _calibrate(request, calibrate, library, output)
+        _calibrate(request, calibrate, file, output)
         return
     for number, source in enumerate(sources):
         into = folders[number] if folders else None
@@ -219,7 +231,7 @@ def _one(request: _Request, source: str, folder: Path | None) -> None:
 
     if request.smoothing:
         raise PbrdfError(f"--smoothing is for maps, and {source} is one measurement: leave it out")
-    measured = open_measurement(source, request.reading)
+    measured = _opened(source, request.reading)
     found = _told(
         source,
         lambda: identify_dataset(
@@ -240,6 +252,14 @@ def _one(request: _Request, source: str, folder: Path | None) -> None:
         return
     print_summary(report, output_console())
     _say_written(folder, written)
+
+
+def _opened(source: str, reading: Reading) -> Measurement:
+    """A measurement, of few wavelengths unless these were chosen: materials are of one."""
+    measured = open_measurement(source, reading)
+    if measured.fit is None:
+        require_choice(measured.dataset, reading, source, otherwise="each material of the library is of one")
+    return measured
 
 
 def _every_pixel(request: _Request, source: str, pixels: xr.Dataset, folder: Path | None) -> None:
@@ -366,7 +386,7 @@ def _labelled(table: Path, library: Library, reading: Reading) -> list[tuple[str
             )
         beside = table.parent / source
         try:
-            measured = open_measurement(str(beside) if beside.exists() else source, reading)
+            measured = _opened(str(beside) if beside.exists() else source, reading)
         except PbrdfError as error:
             raise DataError(f"{at}: {error}") from error
         labelled.append((material, measured.dataset))

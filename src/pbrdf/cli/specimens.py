@@ -15,8 +15,18 @@ if TYPE_CHECKING:
     from pbrdf.identification.library import Library
     from pbrdf.inversion.result import FitResult
 
-__all__ = ["BUNDLED", "Measurement", "open_library", "open_measurement", "open_pixels"]
+__all__ = [
+    "BUNDLED",
+    "LIBRARY",
+    "Measurement",
+    "library_file",
+    "open_library",
+    "open_measurement",
+    "open_pixels",
+]
 
+#: The library's file where none is named.
+LIBRARY = Path("library.json")
 #: What stands for the library that comes with the package, in words.
 BUNDLED = "the bundled paints"
 
@@ -109,6 +119,11 @@ def _in_radians(stored: xr.Dataset) -> xr.Dataset:
         if name in stored and str(stored[name].attrs.get("units", "rad")).startswith("deg")
     }
     return stored.assign(turned)
+
+
+def library_file(named: Path | None) -> Path | None:
+    """The library that is meant: the file that is named, else the one of this folder; None for the bundled paints."""
+    return named if named is not None or not LIBRARY.exists() else LIBRARY
 
 
 def open_library(path: Path | None) -> Library:

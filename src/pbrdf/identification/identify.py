@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from pbrdf.identification.evidence import Evidence, evidence
 from pbrdf.identification.library import Library
 from pbrdf.inversion.noise import Noise, parse_noise
 from pbrdf.inversion.observations import Observations
+from pbrdf.presentation import presenter_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -31,6 +32,10 @@ __all__ = [
     "shares",
     "unknown_gain",
 ]
+
+
+#: p-value by χ² below which chance is no explanation any more: a measurement is then none of the material's.
+FAR = 1e-3
 
 
 @dataclass(frozen=True)
@@ -61,9 +66,11 @@ class Candidate:
     accepted: bool
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Identification:
     """What a measurement says about the materials of a library.
+
+    ``print(identification)`` shows what the command ``pbrdf identify`` prints; a notebook shows a table.
 
     Attributes
     ----------
@@ -87,6 +94,10 @@ class Identification:
         The library.
     temperature
         What logarithms of likelihoods were divided by.
+    prior
+        How common the materials were taken to be, by name; empty for all alike.
+    dataset
+        The data set that was identified, None where there is none.
     """
 
     candidates: tuple[Candidate, ...]
@@ -99,6 +110,22 @@ class Identification:
     data: Observations = field(repr=False)
     library: Library = field(repr=False)
     temperature: float = 1.0
+    prior: Mapping[str, float] = field(default_factory=dict)
+    dataset: xr.Dataset | None = field(default=None, compare=False)
+
+    def __repr__(self) -> str:
+        names = ", ".join(self.materials) or "none of these"
+        return f"<Identification: {names} at {100.0 * self.confidence:g} %, {len(self.candidates)} candidates>"
+
+    def __str__(self) -> str:
+        return self.summary().rstrip()
+
+    def _repr_html_(self) -> str:
+        return str(presenter_of("identification").html(self))
+
+    def summary(self) -> str:
+        """What ``pbrdf identify`` prints: the set, the candidates, what the answer rests on."""
+        return str(presenter_of("identification").summary(self))
 
     @property
     def materials(self) -> list[str]:
@@ -109,6 +136,17 @@ class Identification:
     def none_of_these(self) -> bool:
         """Whether the measurement is like none of the library's materials."""
         return not self.materials
+
+    @property
+    def far_from_all(self) -> bool:
+        """Whether it is so unlike every material that probabilities among them say nothing of the sample.
+
+        They add up to 1 whatever was measured. Where even the likeliest specimen of every material is beyond chance,
+        their ratios are those of the tails of normal distributions, at which nobody has ever looked.
+        """
+        distance = np.array([[candidate.distance for candidate in self.candidates]])
+        by_chance = nominal(distance, np.array([self.degrees_of_freedom]))
+        return self.none_of_these and bool((by_chance < FAR).all())
 
     def __getitem__(self, name: str) -> Candidate:
         for candidate in self.candidates:
@@ -169,7 +207,7 @@ def identify(
     if isinstance(noise, str):
         noise = parse_noise(noise)
     observed = Observations.from_dataset(dataset, noise)
-    return identify_observations(
+    found = identify_observations(
         observed,
         library,
         confidence=confidence,
@@ -179,6 +217,7 @@ def identify(
         prior=prior,
         calibration=calibration,
     )
+    return replace(found, dataset=dataset)
 
 
 def identify_observations(
@@ -209,8 +248,9 @@ def identify_observations(
         noise=noise,
         calibration=words,
         data=observed,
-        library=library,
+        library=library if calibration is None else replace(library, calibration=calibration),
         temperature=1.0 if used is None else used.temperature,
+        prior=dict(prior or {}),
     )
 
 

@@ -54,7 +54,7 @@ def identify_fit(
         noise = "assumed, scaled to what the fit missed"
     if gain is None:
         gain = unknown_gain(fit.dataset) or any(t.nuisance and t.role == "gain" for t in fit.space.terms)
-    return identify_observations(
+    found = identify_observations(
         observed,
         library,
         confidence=confidence,
@@ -64,3 +64,4 @@ def identify_fit(
         prior=prior,
         calibration=calibration,
     )
+    return replace(found, dataset=fit.dataset)

@@ -22,7 +22,7 @@ from pbrdf.report.identification.calibrated import (
 )
 from pbrdf.report.identification.calibration_figure import confusion_figure, reliability_figure
 from pbrdf.report.identification.class_figure import class_counts, class_figure
-from pbrdf.report.identification.classified import Classified, classes_sentence
+from pbrdf.report.identification.classified import Classified, class_rows, classes_sentence
 from pbrdf.report.identification.folder import write_calibration, write_classes
 from pbrdf.report.identification.summary import summary_text
 
@@ -73,14 +73,15 @@ def test_pixels_are_counted(picture):
     report = Classified(picture, "map.nc", LIBRARY, "the bundled paints")
     assert classes_sentence(report).startswith("of 7 measured pixels white 43 %")
     assert classes_sentence(report).endswith("none of these 29 %; 1 more were not measured")
+    assert [row[2] for row in class_rows(report) if row[1] != "0"] == ["43 %", "14 %", "14 %", "29 %", "–"]
     nothing = Classified(mapped([[-2, -2]]), "map.nc", LIBRARY, "the bundled paints")
     assert classes_sentence(nothing) == "no pixel was measured"
 
 
 def test_colours_of_the_map_are_those_of_the_legend(picture):
     figure = class_figure(picture, "map")
-    assert legend(figure)[0] == "white: 3 (38 %)"
-    assert "none of these: 2 (25 %)" in legend(figure)
+    assert legend(figure)[0] == "white: 3 (43 %)"
+    assert "none of these: 2 (29 %)" in legend(figure)
     (image,) = figure.axes[0].get_images()
     shown = image.cmap(image.norm(np.asarray(image.get_array())))
     by_name = {

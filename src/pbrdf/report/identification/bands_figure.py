@@ -26,6 +26,7 @@ from pbrdf.report.identification.subject import (
     nearest_rejected,
     p_value_in_words,
     probability_in_words,
+    shown_probability,
 )
 from pbrdf.report.style import BLUE, GREY, RED, looks_of, panels, styled
 
@@ -89,7 +90,7 @@ def bands_figure(report: Identified) -> Figure:
                 ax.set_ylabel(channel_label(name, points) if column == 0 else "")
             state = "in the set" if candidate.accepted else "not in the set"
             axes[0, column].set_title(
-                f"{candidate.name}: {state}\nprobability {probability_in_words(candidate.probability)}, "
+                f"{candidate.name}: {state}\nprobability {probability_in_words(shown_probability(report.found, candidate))}, "
                 f"p-value {p_value_in_words(candidate.p_value)}",
                 fontsize=9.0,
                 color="black" if candidate.accepted else RED,

@@ -11,7 +11,7 @@ import numpy as np
 
 from pbrdf.identification.cross_check import Judged
 from pbrdf.identification.library import Library
-from pbrdf.report.identification.subject import joined, scatter_sentence
+from pbrdf.report.identification.subject import cautions_on, fewest_needed, joined, scatter_sentence
 from pbrdf.report.numbers import brief
 
 __all__ = [
@@ -20,7 +20,6 @@ __all__ = [
     "calibrated_sentence",
     "calibration_rests_on",
     "calibration_rows",
-    "fewest_needed",
     "level_of_calibration",
 ]
 
@@ -92,16 +91,12 @@ def calibration_rows(report: Calibrated) -> list[list[str]]:
     return rows
 
 
-def fewest_needed(confidence: float) -> int:
-    """Measurements of a material below which a calibration can exclude nothing at this confidence."""
-    return math.ceil(round(1.0 / (1.0 - confidence), 9)) - 1
-
-
 def calibration_rests_on(report: Calibrated) -> list[str]:
     """Sentences on what these numbers rest on."""
     calibration = report.library.calibration
     assert calibration is not None
     lines = [
+        *cautions_on(report.library),
         "Each measurement was judged with a calibration of the others, so that none flatters itself. The promise holds "
         "for measurements like these: the same instrument, noise, geometries and treatment of gain and angle.",
         f"Temperature: {brief(calibration.temperature, 3)} (logarithms of likelihoods are divided by it; 1 if they "

@@ -11,7 +11,13 @@ from pbrdf.files.atomic import atomic_folder
 from pbrdf.report.identification.calibrated import Calibrated, calibrated_sentence, calibration_rests_on
 from pbrdf.report.identification.classified import Classified, classes_rest_on, classes_sentence
 from pbrdf.report.identification.page import calibration_page, classes_page, page_text
-from pbrdf.report.identification.subject import Identified, rests_on, sentence
+from pbrdf.report.identification.subject import (
+    Identified,
+    ranked,
+    rests_on,
+    sentence,
+    shown_probability,
+)
 from pbrdf.report.identification.summary import summary_text
 from pbrdf.report.numbers import plain
 from pbrdf.version import __version__
@@ -37,7 +43,7 @@ _CAPTIONS = {
     "classes": (
         "The material of each pixel and its probability.",
         "The probability is that of the material told, given that it is one of the library. Black: like none of the "
-        "materials. Grey: not measured. Counts are those of all pixels.",
+        "materials. Grey: not measured. Shares are of the measured pixels.",
     ),
     "reliability": (
         "How often the most probable material is the true one, by its probability.",
@@ -93,13 +99,13 @@ def write_identification(
             {
                 "material": candidate.name,
                 "in_set": candidate.accepted,
-                "probability": candidate.probability,
+                "probability": shown_probability(found, candidate),
                 "p_value": candidate.p_value,
                 "distance": candidate.distance,
                 "scatter": found.library[candidate.name].scatter,
                 "most_likely_specimen": candidate.values,
             }
-            for candidate in found.candidates
+            for candidate in ranked(found)
         ],
         "rests_on": rests_on(report),
     }
@@ -122,7 +128,7 @@ def write_classes(report: Classified, directory: Path, *, figure_format: str | N
                 "value": count.value,
                 "class": count.name,
                 "pixels": count.pixels,
-                "share": count.share,
+                "share_of_measured": count.share,
                 "median_probability": count.confidence,
             }
             for count in report.counts

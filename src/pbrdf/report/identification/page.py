@@ -23,7 +23,16 @@ from pbrdf.report.identification.classified import (
     classes_rest_on,
     classes_sentence,
 )
-from pbrdf.report.identification.subject import HEADINGS, Identified, level_of, rests_on, rows_of, sentence
+from pbrdf.report.identification.subject import (
+    CAUTION,
+    HEADINGS,
+    Identified,
+    level_of,
+    ranked,
+    rests_on,
+    rows_of,
+    sentence,
+)
 from pbrdf.report.page import (
     Section,
     bullets,
@@ -69,12 +78,12 @@ def page_text(report: Identified, figures: Mapping[str, Markup], files: Sequence
     found = report.found
     at = f"{100.0 * found.confidence:g} %"
     candidates = table(
-        f"Materials of the library, the most probable first. The {at} set holds the true one in {at} of such "
+        f"Materials of the library, {'the least unlike' if found.far_from_all else 'the most probable'} first. The {at} set holds the true one in {at} of such "
         "measurements; the p-value says how many measurements of a material are as unlike it as this one.",
         HEADINGS,
         rows_of(found),
         numeric=[1, 2],
-        classes=["" if candidate.accepted else "fixed" for candidate in found.candidates],
+        classes=["" if candidate.accepted else "fixed" for candidate in ranked(found)],
     )
     measured = [bullets(describe(report.dataset))]
     if columns := columns_in_words(report.dataset):
@@ -86,7 +95,7 @@ def page_text(report: Identified, figures: Mapping[str, Markup], files: Sequence
         [
             Section("Candidates", [candidates]),
             Section("The data over what specimens would show", _drawn(figures, "bands")),
-            Section("What it rests on", [bullets(rests_on(report))]),
+            Section("What it rests on", [bullets(_grounds(rests_on(report)))]),
             Section("What was measured", measured),
             _repeat(
                 report,
@@ -95,7 +104,7 @@ def page_text(report: Identified, figures: Mapping[str, Markup], files: Sequence
             ),
         ],
         banner="Simulated data, not measured." if report.dataset.attrs.get("simulated") else "",
-        verdict=_Verdict(level_of(found), sentence(found)),
+        verdict=_Verdict(level_of(found), sentence(found), _doubts(rests_on(report))),
         footer=_footer(),
         navigation=True,
     )
@@ -105,7 +114,7 @@ def classes_page(report: Classified, figures: Mapping[str, Markup], files: Seque
     """The page of a map of materials as HTML; as :func:`page_text`."""
     without = {count.name: count for count in report.counts}["none of these"].share
     pixels = table(
-        "Pixels by the most probable material of their set.",
+        "Pixels by the most probable material of their set; shares are of the measured pixels.",
         CLASS_HEADINGS,
         class_rows(report),
         numeric=[1, 2, 3],
@@ -114,11 +123,15 @@ def classes_page(report: Classified, figures: Mapping[str, Markup], files: Seque
         f"{Path(report.name).name}: which material is where?",
         [
             Section("Materials and how sure they are", [*_drawn(figures, "classes"), pixels]),
-            Section("What it rests on", [bullets(classes_rest_on(report))]),
+            Section("What it rests on", [bullets(_grounds(classes_rest_on(report)))]),
             _repeat(report, files, [("Map", [report.name]), ("Library", [report.library])]),
         ],
         banner="Simulated data, not measured." if report.simulated else "",
-        verdict=_Verdict("describes" if without < 0.5 else "in part", classes_sentence(report)),
+        verdict=_Verdict(
+            "describes" if without < 0.5 else "in part",
+            classes_sentence(report),
+            _doubts(classes_rest_on(report)),
+        ),
         footer=_footer(),
         navigation=True,
     )
@@ -145,6 +158,16 @@ def calibration_page(report: Calibrated, figures: Mapping[str, Markup], files: S
         footer=_footer(),
         navigation=True,
     )
+
+
+def _doubts(sentences: Sequence[str]) -> list[str]:
+    """Those that the answer is not to be read without."""
+    return [line for line in sentences if line.startswith(CAUTION)]
+
+
+def _grounds(sentences: Sequence[str]) -> list[str]:
+    """The others."""
+    return [line for line in sentences if not line.startswith(CAUTION)]
 
 
 def _drawn(figures: Mapping[str, Markup], name: str) -> list[Markup]:

@@ -11,6 +11,7 @@ import numpy as np
 
 from pbrdf.identification.identify import Candidate, Identification
 from pbrdf.identification.library import Library
+from pbrdf.identification.material import Material
 from pbrdf.report.identification.library_summary import scatter_in_words
 from pbrdf.report.numbers import brief, per_cent
 
@@ -18,21 +19,28 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
+    "CAUTION",
     "HEADINGS",
     "Identified",
     "calibration_sentence",
+    "cautions_on",
+    "fewest_needed",
     "joined",
     "level_of",
     "nearest_rejected",
     "p_value_in_words",
     "prior_in_words",
     "probability_in_words",
+    "ranked",
     "rests_on",
     "rows_of",
     "scatter_sentence",
     "sentence",
+    "shown_probability",
 ]
 
+#: How sentences begin without which an answer is not to be read.
+CAUTION = "Caution: "
 HEADINGS = ("material", "probability", "p-value", "in the set", "scatter between specimens")
 #: Wavelengths that differ by more are not the same, nm.
 _OTHER_WAVELENGTH = 5.0
@@ -79,11 +87,14 @@ class Identified:
 def sentence(found: Identification) -> str:
     """What the measurement shows, in one sentence."""
     names, at = found.materials, f"{100.0 * found.confidence:g} %"
-    if not names:
-        best = max(found.candidates, key=lambda candidate: candidate.p_value)
+    best = nearest_rejected(found)
+    if not names and best is not None:
+        size = f"p-value {p_value_in_words(best.p_value)}"
+        if found.far_from_all:
+            times = _times(best.distance / max(found.degrees_of_freedom, 1))
+            size = f"which misses by {brief(times, 2)} times what noise and scatter explain"
         return (
-            f"none of these: unlike every material of the library at {at}; the least unlike is {best.name} "
-            f"(p-value {p_value_in_words(best.p_value)})"
+            f"none of these: unlike every material of the library at {at}; the least unlike is {best.name} ({size})"
         )
     if len(names) == 1:
         return f"{names[0]}: the only material in the {at} set"
@@ -101,17 +112,29 @@ def nearest_rejected(found: Identification) -> Candidate | None:
     return min(outside, key=lambda candidate: (-candidate.p_value, candidate.distance), default=None)
 
 
+def ranked(found: Identification) -> list[Candidate]:
+    """The candidates, the most probable first; where probabilities say nothing, the least unlike."""
+    if found.far_from_all:
+        return sorted(found.candidates, key=lambda candidate: candidate.distance)
+    return list(found.candidates)
+
+
+def shown_probability(found: Identification, candidate: Candidate) -> float:
+    """Probability of a candidate; NaN where probabilities say nothing."""
+    return math.nan if found.far_from_all else candidate.probability
+
+
 def rows_of(found: Identification) -> list[list[str]]:
     """The candidates as texts below :data:`HEADINGS`."""
     return [
         [
             candidate.name,
-            probability_in_words(candidate.probability),
+            probability_in_words(shown_probability(found, candidate)),
             p_value_in_words(candidate.p_value),
             "yes" if candidate.accepted else "no",
             scatter_in_words(found.library[candidate.name]),
         ]
-        for candidate in found.candidates
+        for candidate in ranked(found)
     ]
 
 
@@ -134,7 +157,10 @@ def p_value_in_words(p_value: float) -> str:
 def rests_on(report: Identified) -> list[str]:
     """Sentences on what the answer rests on."""
     found = report.found
-    lines = [calibration_sentence(found.library), scatter_sentence(found.library)]
+    lines = cautions_on(found.library, _relative_noise(found))
+    lines += _other_wavelength(report)
+    lines.append(f"Library: {library_in_words(report.library, found.library)}.")
+    lines += [calibration_sentence(found.library, found.confidence), scatter_sentence(found.library)]
     if all("_over_" in name or name == "dolp" for name in found.data.channels):
         lines.append("Gain: the data are ratios, which no gain touches.")
     elif found.gain:
@@ -154,13 +180,89 @@ def rests_on(report: Identified) -> list[str]:
             else "."
         )
     )
-    lines.append(prior_in_words(report.prior))
-    lines += _other_wavelength(report)
+    if found.far_from_all:
+        lines.append(
+            "Probabilities: none. They would say which material it is if it is one of these, and it is unlike all."
+        )
+    else:
+        lines.append(prior_in_words(report.prior))
     return lines
 
 
-def calibration_sentence(library: Library) -> str:
-    """What makes the sets hold what they promise."""
+def library_in_words(name: str, library: Library) -> str:
+    """``paints.json, 3 materials``"""
+    count = len(library.materials)
+    return f"{name}, {count} material{'' if count == 1 else 's'}"
+
+
+def cautions_on(library: Library, noise: float | None = math.nan) -> list[str]:
+    """Sentences on materials whose own fits are in doubt.
+
+    Parameters
+    ----------
+    library
+        The materials.
+    noise
+        Uncertainty of what is compared, relative to the intensity; NaN where it is not known, None where nobody can
+        state it.
+    """
+    lines = []
+    missed = [m for m in library.materials if m.fits.misfits(math.nan if noise is None else noise)]
+    if missed:
+        listed = joined([misfit_in_words(m) for m in missed], "and")
+        largest = max((m.fits.missed for m in missed if math.isfinite(m.fits.missed)), default=math.nan)
+        stated = ""
+        if noise is not None and math.isfinite(largest):
+            stated = f", or state noise that covers it (`--noise {math.ceil(100.0 * largest)}%`)"
+        sets = (
+            "sets are calibrated and hold all the same, probabilities may not"
+            if library.calibration is not None
+            else "a wrong material may be named, or none"
+        )
+        lines.append(
+            f"{CAUTION}the library's model misses its own specimens of {listed}. That counts here as if it told "
+            f"materials apart: {sets}. Find a model that describes them (`pbrdf compare DATA`, then "
+            f"`pbrdf library add NAME DATA --model MODEL`){stated}."
+        )
+    doubted = [m.name for m in library.materials if m.fits.cautions]
+    if doubted:
+        lines.append(
+            f"{CAUTION}the fits behind {joined(doubted, 'and')} are not sound in every respect: "
+            f"`pbrdf library show` says why."
+        )
+    return lines
+
+
+def misfit_in_words(material: Material) -> str:
+    """``white (by 5.2 times their uncertainty, 12 % of the intensity)``"""
+    fits = material.fits
+    size = "" if math.isnan(fits.missed) else f", {per_cent(fits.missed)} of the signal"
+    return f"{material.name} (by {brief(_times(fits.reduced_chi2), 2)} times their uncertainty{size})"
+
+
+def _times(by_degree: float) -> float:
+    """χ² by degree of freedom as how many times larger misfits are than chance has them (rms)."""
+    return math.sqrt(max(by_degree, 0.0))
+
+
+def _relative_noise(found: Identification) -> float:
+    """Uncertainty of the intensity relative to it, median over the geometries; NaN where none was measured."""
+    name = next((n for n in ("I", "m00") if n in found.data.channels), None)
+    if name is None:
+        return math.nan
+    c = found.data.channels.index(name)
+    values, std = found.data.values[c], found.data.std[c]
+    there = np.isfinite(std) & (values > 0.0)
+    return float(np.median(std[there] / values[there])) if there.any() else math.nan
+
+
+def fewest_needed(confidence: float) -> int:
+    """Measurements of a material below which a calibration can exclude nothing at this confidence."""
+    return math.ceil(round(1.0 / (1.0 - confidence), 9)) - 1
+
+
+def calibration_sentence(library: Library, confidence: float) -> str:
+    """What makes the sets hold what they promise, and which materials they can never leave out."""
     if library.calibration is None:
         return (
             "Sets: not calibrated. They hold the true material as often as they say if specimens scatter as the "
@@ -174,7 +276,19 @@ def calibration_sentence(library: Library) -> str:
         if not len(own)
     ]
     without = f"; none of {joined(bare, 'or')}, for which χ² counts" if bare else ""
-    return f"Sets: calibrated with {total} measurements of known materials ({words}{without})."
+    needed = fewest_needed(confidence)
+    few = [
+        f"{name} ({len(own)})"
+        for name, own in zip(library.calibration.names, library.calibration.scores, strict=True)
+        if 0 < len(own) < needed
+    ]
+    always = ""
+    if few:
+        always = (
+            f" The set holds {joined(few, 'and')} whatever was measured: it takes {needed} measurements of a material "
+            f"to leave it out at {100.0 * confidence:g} %; calibrate with more, or ask for less confidence."
+        )
+    return f"Sets: calibrated with {total} measurements of known materials ({words}{without}).{always}"
 
 
 def scatter_sentence(library: Library) -> str:
@@ -215,7 +329,7 @@ def _other_wavelength(report: Identified) -> list[str]:
     if not others:
         return []
     span = f"{low:g} nm" if high - low < 1e-6 else f"{low:g} … {high:g} nm"
-    return [f"Caution: the data are of {span}, other than {joined(others, 'and')}."]
+    return [f"{CAUTION}the data are of {span}, other than {joined(others, 'and')}."]
 
 
 def joined(names: Sequence[str], word: str) -> str:
