@@ -272,9 +272,7 @@ __all__ = [
 
 point_drjit_to_llvm()
 provide_presenter("fit", lambda: importlib.import_module("pbrdf.report.fit.presenter"))
-provide_presenter(
-    "identification", lambda: importlib.import_module("pbrdf.report.identification.presenter")
-)
+provide_presenter("identification", lambda: importlib.import_module("pbrdf.report.identification.presenter"))
 
 
 def __getattr__(name: str) -> Any:

@@ -154,11 +154,23 @@ def test_one_rule_says_which_library_is_meant(run, refused, tmp_path):
 @pytest.mark.slow
 def test_a_model_is_named_and_how_data_were_read_is_kept(run, refused, fits, tmp_path):
     pbrdf.write(pbrdf.open_experiment("cd-back").isel(geometry=BRIEF), tmp_path / "back.nc")
-    run("library", "add", "back", "back.nc", "--select", "theta_i=0:80", "--model", "reciprocal-double-gauss", "-q")
+    run(
+        "library",
+        "add",
+        "back",
+        "back.nc",
+        "--select",
+        "theta_i=0:80",
+        "--model",
+        "reciprocal-double-gauss",
+        "-q",
+    )
     (made,) = read_library(tmp_path / "library.json").materials
     assert made.space.model.name == "reciprocal-double-gauss"
     assert made.provenance[0].endswith("(--select theta_i=0:80 --model reciprocal-double-gauss)")
-    assert "is a fit, of a model already" in refused("library", "add", "a", fits[0], "--model", "double-gauss")
+    assert "is a fit, of a model already" in refused(
+        "library", "add", "a", fits[0], "--model", "double-gauss"
+    )
 
 
 @pytest.mark.slow

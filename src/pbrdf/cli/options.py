@@ -144,7 +144,11 @@ def library_option(*, changed: bool = False) -> Any:
     """``--library``: a file of materials that is read, or changed, which the bundled paints cannot be."""
     shown = "library.json in this folder" + ("" if changed else ", else the bundled paints")
     return typer.Option(
-        "--library", "-l", help="File of the library, see `pbrdf library`.", metavar="FILE", show_default=shown
+        "--library",
+        "-l",
+        help="File of the library, see `pbrdf library`.",
+        metavar="FILE",
+        show_default=shown,
     )
 
 

@@ -115,7 +115,9 @@ class Identification:
 
     def __repr__(self) -> str:
         names = ", ".join(self.materials) or "none of these"
-        return f"<Identification: {names} at {100.0 * self.confidence:g} %, {len(self.candidates)} candidates>"
+        return (
+            f"<Identification: {names} at {100.0 * self.confidence:g} %, {len(self.candidates)} candidates>"
+        )
 
     def __str__(self) -> str:
         return self.summary().rstrip()

@@ -13,9 +13,9 @@
 
 ``mean`` and ``covariance`` are those of the unknowns: of the logarithm where it says ``log NAME``, of the square where
 ``square NAME``, else of the parameter itself in its unit; ``lower`` and ``upper`` bound the parameters of a specimen.
-``wavelength_nm`` is null where it is not known, ``calibration`` where there is none. ``fits`` says what the specimens'
-fits are worth (:class:`~pbrdf.identification.specimen_fits.SpecimenFits`); its numbers are null where they are not known,
-and files may be without it.
+``wavelength_nm`` is null where it is not known, ``calibration`` where there is none. ``fits`` says what the
+specimens' fits are worth (:class:`~pbrdf.identification.specimen_fits.SpecimenFits`), null where a number is not known;
+files may be without it.
 """
 
 from __future__ import annotations

@@ -89,8 +89,9 @@ def bands_figure(report: Identified) -> Figure:
                 _scale(ax, name, channel.measured, shared)
                 ax.set_ylabel(channel_label(name, points) if column == 0 else "")
             state = "in the set" if candidate.accepted else "not in the set"
+            probability = probability_in_words(shown_probability(report.found, candidate))
             axes[0, column].set_title(
-                f"{candidate.name}: {state}\nprobability {probability_in_words(shown_probability(report.found, candidate))}, "
+                f"{candidate.name}: {state}\nprobability {probability}, "
                 f"p-value {p_value_in_words(candidate.p_value)}",
                 fontsize=9.0,
                 color="black" if candidate.accepted else RED,

@@ -80,7 +80,8 @@ def _listed(library: Library, name: str) -> Iterator[RenderableType]:
     doubted = [material.name for material in library.materials if material.fits.cautions]
     if doubted:
         yield (
-            f"Caution: the fits behind {', '.join(doubted)} are not sound in every respect; `pbrdf library show` says why."
+            f"Caution: the fits behind {', '.join(doubted)} are not sound in every respect; `pbrdf library show` says "
+            "why."
         )
     yield calibration_in_words(library)
 
@@ -135,7 +136,6 @@ def _fits(material: Material) -> Iterator[str]:
         yield f"Caution: {caution}"
     if fits.cautions:
         yield REMEDY
-
 
 
 def _wavelength(material: Material) -> str:

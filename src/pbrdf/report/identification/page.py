@@ -77,8 +77,9 @@ def page_text(report: Identified, figures: Mapping[str, Markup], files: Sequence
     """
     found = report.found
     at = f"{100.0 * found.confidence:g} %"
+    first = "the least unlike" if found.far_from_all else "the most probable"
     candidates = table(
-        f"Materials of the library, {'the least unlike' if found.far_from_all else 'the most probable'} first. The {at} set holds the true one in {at} of such "
+        f"Materials of the library, {first} first. The {at} set holds the true one in {at} of such "
         "measurements; the p-value says how many measurements of a material are as unlike it as this one.",
         HEADINGS,
         rows_of(found),

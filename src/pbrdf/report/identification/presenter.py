@@ -24,7 +24,9 @@ def summary(found: Identification) -> str:
 def html(found: Identification) -> str:
     """The set in a sentence, a table of the candidates, and what both rest on."""
     head = "".join(f"<th>{title}</th>" for title in HEADINGS)
-    rows = "".join(f"<tr>{''.join(f'<td>{escape(text)}</td>' for text in row)}</tr>" for row in rows_of(found))
+    rows = "".join(
+        f"<tr>{''.join(f'<td>{escape(text)}</td>' for text in row)}</tr>" for row in rows_of(found)
+    )
     lines = "".join(f"<p>{escape(line)}</p>" for line in rests_on(_report(found)))
     table = f"<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"
     return f"<div><p>{escape(sentence(found))}</p>{table}{lines}</div>"

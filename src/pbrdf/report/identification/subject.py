@@ -93,9 +93,7 @@ def sentence(found: Identification) -> str:
         if found.far_from_all:
             times = _times(best.distance / max(found.degrees_of_freedom, 1))
             size = f"which misses by {brief(times, 2)} times what noise and scatter explain"
-        return (
-            f"none of these: unlike every material of the library at {at}; the least unlike is {best.name} ({size})"
-        )
+        return f"none of these: unlike every material of the library at {at}; the least unlike is {best.name} ({size})"
     if len(names) == 1:
         return f"{names[0]}: the only material in the {at} set"
     return f"{joined(names, 'or')}: at {at} the measurement does not tell them apart"
