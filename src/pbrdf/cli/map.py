@@ -254,6 +254,8 @@ def map_pixels(
     else:
         picture = report / _QUICK_LOOK if figures else None
         grid = _units(outline, fit.dims, unit, memory)
+        if unit is not None and target.exists():
+            _require_units(target, MapStore(target, fit, source).grid, grid)
         if not _fill(target, fit, source, grid, place, scheduler, picture, quiet):
             if quiet:
                 print(target)
@@ -444,6 +446,16 @@ def _units(outline: xr.Dataset, dims: Sequence[str], side: int | None, memory: i
         if set(dims) & set(map(str, variable.dims))
     )
     return UnitGrid.of(sizes, pixels=max(min(memory // (_BYTES * numbers), UNIT), 1))
+
+
+def _require_units(target: Path, begun: UnitGrid, asked: UnitGrid) -> None:
+    """Raise if units of another size are asked for than a map was begun with: they stay as they are."""
+    if begun.shard != asked.shard:
+        cut, wanted = (" × ".join(map(str, grid.shard)) for grid in (begun, asked))
+        raise PbrdfError(
+            f"--unit: {target} was begun in units of {cut} pixels, and goes on in these; {wanted} are asked for: leave "
+            "--unit out, or choose another folder"
+        )
 
 
 def _report(subject: MapReport, folder: Path, formats: Sequence[str], figures: bool, quiet: bool) -> None:

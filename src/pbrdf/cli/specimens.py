@@ -83,18 +83,21 @@ def open_pixels(source: str) -> xr.Dataset | None:
     Raises
     ------
     DataError
-        If it is a file of one of the forms that hold maps, but cannot be read.
+        If it is a file of one of the forms that hold maps, but cannot be read, or a map that is not complete; or if it
+        holds Stokes pictures without their geometry.
     """
+    from pbrdf.data.formats.stored import require_no_pictures
     from pbrdf.data.formats.zarr_folder import open_zarr
     from pbrdf.data.schema import DIMENSION, STOKES_AXES
     from pbrdf.files.netcdf_files import open_netcdf
+    from pbrdf.inversion.map_store import is_map, open_map
     from pbrdf.inversion.stored_result import FILE_NAME
 
     path = Path(source)
     if not path.exists() or path.name == FILE_NAME:
         return None
     if path.is_dir() and path.suffix.lower() == ".zarr":
-        opened = open_zarr(path, decode_times=False)
+        opened = open_map(path) if is_map(path) else open_zarr(path, decode_times=False)
     elif path.is_file() and path.suffix.lower() in (".nc", ".nc4"):
         opened = open_netcdf(path, decode_times=False)
     else:
@@ -103,6 +106,7 @@ def open_pixels(source: str) -> xr.Dataset | None:
         return opened
     if DIMENSION in opened.dims and {*map(str, opened.dims)} - {DIMENSION, *STOKES_AXES}:
         return _in_radians(opened)
+    require_no_pictures(opened, path)
     opened.close()
     return None
 
