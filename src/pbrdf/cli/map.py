@@ -232,6 +232,7 @@ def map_pixels(
         set_backend(backend)
     if polarimeter is not None:
         stokes = _reduced(stokes, polarimeter, angles, target, quiet)
+    from pbrdf.instruments.pixel_geometry.labels import read_labels
     from pbrdf.inversion.map_store import open_map
     from pbrdf.inversion.map_store.map_store import MapStore
     from pbrdf.inversion.map_store.picture_source import PictureSource
@@ -268,6 +269,7 @@ def map_pixels(
         {"model": model, **arguments, "geometry": geometry, "counts per brdf": counts_per_brdf},
         command_line(),
         simulated=bool(outline.attrs.get("simulated")),
+        labels=None if labels is None else read_labels(labels, outline.sizes["y"], outline.sizes["x"]),
     )
     _report(subject, report, formats, figures, quiet)
 

@@ -79,8 +79,8 @@ def require_no_pixels(stored: xr.Dataset, path: Path) -> None:
     """Raise if a file holds pictures, data of pixels or a map of parameters; the message says what takes them."""
     if "estimate" in stored.variables and "parameter" in stored.dims:
         raise DataError(
-            f"{path}: holds a map of fitted parameters, not measurements: pbrdf.open_map opens it, `pbrdf identify` and "
-            "pbrdf.identify_map tell the materials of its pixels"
+            f"{path}: holds a map of fitted parameters, not measurements: pbrdf.open_map opens it, `pbrdf identify` "
+            "and pbrdf.identify_map tell the materials of its pixels"
         )
     require_no_pictures(stored, path)
     pixels = [str(d) for d in stored.dims if d not in (DIMENSION, *STOKES_AXES)]

@@ -166,8 +166,8 @@ def _require_uncertainties(dataset: xr.Dataset, dims: Sequence[str]) -> None:
             pixels = math.prod(dataset.sizes[d] for d in dims if d in std.dims)
             along = tuple(std.dims.index(d) for d in std.dims if d not in dims)
             raise DataError(
-                f"{name} is 0 or less at {int(wrong.any(axis=along).sum())} of {pixels} pixels, and nowhere above 0: it "
-                "is a standard uncertainty; leave it out where none is known"
+                f"{name} is 0 or less at {int(wrong.any(axis=along).sum())} of {pixels} pixels, and nowhere above 0: "
+                "it is a standard uncertainty; leave it out where none is known"
             )
 
 
