@@ -238,3 +238,22 @@ def test_many_wavelengths_are_a_choice(refused, run, tmp_path):
     assert run("identify", "many.nc", "--wavelength", 450, "-q").output.startswith("many.nc: ")
     (tmp_path / "labels.csv").write_text("file,material\nmany.nc,white\n", encoding="utf-8")
     assert "there are 8 wavelengths" in refused("identify", "--calibrate", "labels.csv")
+
+
+@pytest.mark.slow
+def test_unfinished_maps_and_pictures_are_not_identified(refused, tmp_path):
+    """A map whose units are not all done, as an interrupted `pbrdf map` leaves it; pictures of `pbrdf reduce`."""
+    from pbrdf.inversion.map_store import DatasetSource, prepare_store
+    from pbrdf.inversion.parameter_map import MapFit
+
+    one = measured(bundled_library()["white"].model)
+    data = one.map(
+        lambda values: values.expand_dims(y=2, x=2).transpose("geometry", "y", "x"), keep_attrs=True
+    )
+    prepare_store(tmp_path / "half.zarr", MapFit.prepare(data), DatasetSource(data))
+    assert "half.zarr: this map is not complete: 1 of 1 units are missing" in refused("identify", "half.zarr")
+    pictures = xr.Dataset({"I": (("series", "y", "x"), np.ones((2, 3, 4)))})
+    pictures.to_netcdf(tmp_path / "stokes.nc", engine="h5netcdf")
+    text = refused("identify", "stokes.nc")
+    assert "Stokes pictures, whose pixels have no geometry yet: `pbrdf map stokes.nc -g flat:…`" in text
+    assert "pbrdf.map_dataset" in text
