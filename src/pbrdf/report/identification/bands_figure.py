@@ -59,6 +59,7 @@ def bands_figure(report: Identified) -> Figure:
     looks = looks_of(len(cuts))
     candidates = shown_candidates(report)
     names = list(points.channels)[:_MOST_QUANTITIES]
+    drawn = np.concatenate([cut.rows for cut in cuts]) if cuts else np.arange(points.theta_i.size)
     at = _along(report, cuts)
     with styled():
         handles = _handles(ShownCuts(cuts, looks, whole.found), report)
@@ -86,7 +87,7 @@ def bands_figure(report: Identified) -> Figure:
                     ax.set_xlabel("angle of incidence θi (°)" if over else VIEWING_ANGLE, fontsize=8.5)
                 else:
                     _side_by_side(ax, bands[name], channel.measured, channel.std)
-                _scale(ax, name, channel.measured, shared)
+                _scale(ax, name, channel.measured[drawn], shared)
                 ax.set_ylabel(channel_label(name, points) if column == 0 else "")
             state = "in the set" if candidate.accepted else "not in the set"
             probability = probability_in_words(shown_probability(report.found, candidate))
@@ -184,7 +185,9 @@ def _scale(ax: Axes, name: str, measured: np.ndarray, shared: dict[str, tuple[fl
             scale_intensity(ax, measured)
             positive = finite[finite > 0.0]
             if ax.get_yscale() == "log" and positive.size:
-                shared[name] = (0.4 * float(positive.min()), 2.5 * float(positive.max()))
+                # what lies below a limit that is set has been counted as not shown
+                lowest = 0.4 * float(positive.min()) if ax.get_autoscaley_on() else ax.get_ylim()[0]
+                shared[name] = (lowest, 2.5 * float(positive.max()))
             else:
                 shared[name] = (min(0.0, 1.1 * float(finite.min())), 1.35 * float(finite.max()))
         elif name == "dolp":
@@ -205,11 +208,12 @@ def _handles(shown: ShownCuts, report: Identified) -> list[Any]:
         Line2D([], [], color=look.colour, marker=look.marker, linestyle="none", label=shown.label(cut))
         for cut, look in zip(shown.cuts, shown.looks, strict=True)
     ]
-    if len(shown.cuts) < shown.found:
-        handles[-1].set_label(f"{handles[-1].get_label()} ({len(shown.cuts)} of {shown.found} curves drawn)")
     colour = GREY if shown.cuts else BLUE
     best = " (scaled to the data)" if report.found.gain else ""
-    handles.append(Line2D([], [], color="black", marker="o", linestyle="none", label="points: measured"))
+    some = f", {len(shown.cuts)} of {shown.found} curves" if len(shown.cuts) < shown.found else ""
+    handles.append(
+        Line2D([], [], color="black", marker="o", linestyle="none", label=f"points: measured{some}")
+    )
     handles.append(Patch(color=colour, alpha=0.3, linewidth=0, label=f"95 % of specimens{best}"))
     handles.append(Line2D([], [], color=colour, label="most likely specimen"))
     return handles
