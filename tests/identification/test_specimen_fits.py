@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ import pytest
 import pbrdf
 from pbrdf.identification.library import Library, bundled_library, read_library
 from pbrdf.identification.material import material_from_fits
-from pbrdf.identification.specimen_fits import SpecimenFits
+from pbrdf.identification.specimen_fits import SpecimenFits, relative_noise
 
 
 @pytest.fixture(scope="module")
@@ -26,7 +27,10 @@ def bent_fit():
 def test_a_model_that_misses_its_specimens_is_told(bent_fit, tmp_path):
     made = material_from_fits("bent", [bent_fit], labels=["the fit of bent.csv"])
     assert made.fits.reduced_chi2 == bent_fit.goodness.reduced_chi2
-    assert made.fits.missed == pytest.approx(bent_fit.fitted["all"].intensity_rms)
+    # noise so large would explain the misfit; that of the data is 1 % of the intensity
+    assert relative_noise(bent_fit.data) == pytest.approx(0.01, rel=0.35)
+    wide = replace(bent_fit.data, std=bent_fit.data.std * np.sqrt(bent_fit.goodness.reduced_chi2))
+    assert made.fits.missed == pytest.approx(relative_noise(wide))
     assert made.fits.misfits()
     assert made.fits.misfits(0.5 * made.fits.missed)
     assert not made.fits.misfits(1.1 * made.fits.missed)
@@ -51,3 +55,11 @@ def test_a_library_without_the_fits_is_read(tmp_path):
         assert material.pop("fits") == {"reduced_chi2": None, "missed": None, "cautions": []}
     (tmp_path / "library.json").write_text(json.dumps(content), encoding="utf-8")
     assert not read_library(tmp_path / "library.json")["white"].fits.misfits()
+
+
+def test_noise_of_ratios_and_of_nothing_known(bent_fit):
+    data = bent_fit.data
+    ratios = replace(data, channels=("dolp",), values=data.values[:1], std=np.full_like(data.std[:1], 0.02))
+    assert relative_noise(ratios) == pytest.approx(0.02)
+    unknown = replace(data, std=np.full_like(data.std, np.nan))
+    assert math.isnan(relative_noise(unknown))

@@ -298,6 +298,11 @@ def _provenance(specimen: Measurement, reading: Reading, model: str | None) -> s
     for name, value in options.items():
         option = f"--{name.replace('_', '-')}"
         values = value if isinstance(value, list) else [value]
-        given += [option if one is True else f"{option} {one}" for one in values]
+        given += [option if one is True else f"{option} {_plain(one)}" for one in values]
     how = f" ({' '.join(given)})" if given else ""
     return f"fitted to {specimen.origin}{how}"
+
+
+def _plain(value: object) -> str:
+    """A value of an option as one would type it."""
+    return f"{value:g}" if isinstance(value, float) else str(value)

@@ -13,11 +13,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pbrdf.inversion.holdout import prediction_errors
+from pbrdf.data.schema import is_ratio
+from pbrdf.inversion.observations import Observations
 from pbrdf.inversion.optimum import Optimum
 from pbrdf.inversion.verdict import Level, verdict
 
-__all__ = ["SpecimenFits"]
+__all__ = ["SpecimenFits", "relative_noise"]
 
 #: χ² by degree of freedom beyond which what a model misses is no longer lost in the noise: it is as large as that.
 MISFIT = 2.0
@@ -32,8 +33,8 @@ class SpecimenFits:
     reduced_chi2
         χ² by degree of freedom, median over the specimens; NaN where it is not known.
     missed
-        Rms error of the fitted intensity relative to it (of the degree of polarisation or the ratios where no intensity
-        was measured), median over the specimens; NaN where it is not known.
+        Noise that would explain what the model misses: that of the fitted data (:func:`relative_noise`) times the root
+        of χ² by degree of freedom, median over the specimens; NaN where it is not known.
     cautions
         A sentence on each fit that describes its data only in part, or not, or whose parameters are not to be quoted.
     """
@@ -62,16 +63,28 @@ class SpecimenFits:
         Parameters
         ----------
         noise
-            Uncertainty of a measurement that is to be compared, relative to its intensity; what the model misses is no
-            harm where it is less than that. NaN where it is not known.
+            Of a measurement that is to be compared, see :func:`relative_noise`; NaN where it is not known. What the
+            model misses is no harm where it is less than that.
         """
         return self.reduced_chi2 > MISFIT and not self.missed <= noise
 
 
+def relative_noise(data: Observations) -> float:
+    """Uncertainty of the intensity relative to it, or of the ratios where there are only these; NaN if not known.
+
+    The median over the geometries: robust against the dark ones, where it has no limit.
+    """
+    channels = [c for c, name in enumerate(data.channels) if name in ("I", "m00")]
+    if not channels:
+        std = data.std[np.isfinite(data.std)]
+        return float(np.median(std)) if std.size and all(map(is_ratio, data.channels)) else math.nan
+    values, std = data.values[channels[0]], data.std[channels[0]]
+    there = np.isfinite(std) & (values > 0.0)
+    return float(np.median(std[there] / values[there])) if there.any() else math.nan
+
+
 def _missed(fit: Optimum) -> float:
-    errors = prediction_errors(fit.comparison, ~fit.comparison["held_out"].values)
-    found = (errors.intensity_rms, errors.ratio_rms, errors.dolp_rms)
-    return next((error for error in found if math.isfinite(error)), math.nan)
+    return relative_noise(fit.data) * math.sqrt(max(fit.goodness.reduced_chi2, 0.0))
 
 
 def _median(values: Sequence[float]) -> float:

@@ -9,7 +9,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from pbrdf.identification.library import Library
-from pbrdf.inversion.noise import parse_noise
+from pbrdf.inversion.noise import NoiseModel, parse_noise
 from pbrdf.report.identification.class_figure import ClassCount, class_counts
 from pbrdf.report.identification.subject import (
     calibration_sentence,
@@ -106,7 +106,8 @@ def _noise(report: Classified) -> float | None:
     if report.gain is None:
         return None
     stated = report.settings.get("noise")
-    return math.nan if stated is None else getattr(parse_noise(stated), "relative", math.nan)
+    noise = None if stated is None else parse_noise(stated)
+    return math.hypot(noise.relative, noise.absolute) if isinstance(noise, NoiseModel) else math.nan
 
 
 def classes_rest_on(report: Classified) -> list[str]:

@@ -123,7 +123,7 @@ def _fits(material: Material) -> Iterator[str]:
     if math.isfinite(fits.reduced_chi2):
         sizes.append(f"χ² by degree of freedom {brief(fits.reduced_chi2, 2)}")
     if math.isfinite(fits.missed):
-        sizes.append(f"rms error {per_cent(fits.missed)} of the signal")
+        sizes.append(f"they miss by {per_cent(fits.missed)} of the signal")
     if sizes:
         yield f"Fits of the specimens (median): {', '.join(sizes)}."
     if fits.misfits():

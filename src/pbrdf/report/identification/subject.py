@@ -12,6 +12,7 @@ import numpy as np
 from pbrdf.identification.identify import Candidate, Identification
 from pbrdf.identification.library import Library
 from pbrdf.identification.material import Material
+from pbrdf.identification.specimen_fits import relative_noise
 from pbrdf.report.identification.library_summary import scatter_in_words
 from pbrdf.report.numbers import brief, per_cent
 
@@ -155,7 +156,7 @@ def p_value_in_words(p_value: float) -> str:
 def rests_on(report: Identified) -> list[str]:
     """Sentences on what the answer rests on."""
     found = report.found
-    lines = cautions_on(found.library, _relative_noise(found))
+    lines = cautions_on(found.library, relative_noise(found.data))
     lines += _other_wavelength(report)
     lines.append(f"Library: {library_in_words(report.library, found.library)}.")
     lines += [calibration_sentence(found.library, found.confidence), scatter_sentence(found.library)]
@@ -211,7 +212,7 @@ def cautions_on(library: Library, noise: float | None = math.nan) -> list[str]:
         largest = max((m.fits.missed for m in missed if math.isfinite(m.fits.missed)), default=math.nan)
         stated = ""
         if noise is not None and math.isfinite(largest):
-            stated = f", or state noise that covers it (`--noise {math.ceil(100.0 * largest)}%`)"
+            stated = f", or state noise that covers it (`--noise {_stated(largest)}`)"
         sets = (
             "sets are calibrated and hold all the same, probabilities may not"
             if library.calibration is not None
@@ -231,6 +232,11 @@ def cautions_on(library: Library, noise: float | None = math.nan) -> list[str]:
     return lines
 
 
+def _stated(noise: float) -> str:
+    """A relative noise as the option that gives it, whose absolute part is as large where the intensity is usual."""
+    return f"{math.ceil(100.0 * noise / math.sqrt(2.0) - 1e-6)}%"
+
+
 def misfit_in_words(material: Material) -> str:
     """``white (by 5.2 times their uncertainty, 12 % of the intensity)``"""
     fits = material.fits
@@ -241,17 +247,6 @@ def misfit_in_words(material: Material) -> str:
 def _times(by_degree: float) -> float:
     """χ² by degree of freedom as how many times larger misfits are than chance has them (rms)."""
     return math.sqrt(max(by_degree, 0.0))
-
-
-def _relative_noise(found: Identification) -> float:
-    """Uncertainty of the intensity relative to it, median over the geometries; NaN where none was measured."""
-    name = next((n for n in ("I", "m00") if n in found.data.channels), None)
-    if name is None:
-        return math.nan
-    c = found.data.channels.index(name)
-    values, std = found.data.values[c], found.data.std[c]
-    there = np.isfinite(std) & (values > 0.0)
-    return float(np.median(std[there] / values[there])) if there.any() else math.nan
 
 
 def fewest_needed(confidence: float) -> int:
