@@ -24,14 +24,12 @@ from pbrdf.cli.options import (
 from pbrdf.cli.reading import Reading
 from pbrdf.cli.specimens import (
     BUNDLED,
-    Measurement,
     library_file,
+    open_compared,
     open_library,
-    open_measurement,
     open_pixels,
 )
 from pbrdf.cli.values import numbers
-from pbrdf.cli.wavelengths import require_choice
 from pbrdf.errors import DataError, FitError, PbrdfError
 
 if TYPE_CHECKING:
@@ -231,7 +229,7 @@ def _one(request: _Request, source: str, folder: Path | None) -> None:
 
     if request.smoothing:
         raise PbrdfError(f"--smoothing is for maps, and {source} is one measurement: leave it out")
-    measured = _opened(source, request.reading)
+    measured = open_compared(source, request.reading)
     found = _told(
         source,
         lambda: identify_dataset(
@@ -252,14 +250,6 @@ def _one(request: _Request, source: str, folder: Path | None) -> None:
         return
     print_summary(report, output_console())
     _say_written(folder, written)
-
-
-def _opened(source: str, reading: Reading) -> Measurement:
-    """A measurement, of few wavelengths unless these were chosen: materials are of one."""
-    measured = open_measurement(source, reading)
-    if measured.fit is None:
-        require_choice(measured.dataset, reading, source, otherwise="each material of the library is of one")
-    return measured
 
 
 def _every_pixel(request: _Request, source: str, pixels: xr.Dataset, folder: Path | None) -> None:
@@ -386,7 +376,7 @@ def _labelled(table: Path, library: Library, reading: Reading) -> list[tuple[str
             )
         beside = table.parent / source
         try:
-            measured = _opened(str(beside) if beside.exists() else source, reading)
+            measured = open_compared(str(beside) if beside.exists() else source, reading)
         except PbrdfError as error:
             raise DataError(f"{at}: {error}") from error
         labelled.append((material, measured.dataset))

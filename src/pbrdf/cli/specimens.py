@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pbrdf.cli.reading import Reading
+from pbrdf.cli.wavelengths import require_choice
 from pbrdf.errors import DataError
 
 if TYPE_CHECKING:
@@ -20,6 +21,7 @@ __all__ = [
     "LIBRARY",
     "Measurement",
     "library_file",
+    "open_compared",
     "open_library",
     "open_measurement",
     "open_pixels",
@@ -75,6 +77,14 @@ def open_measurement(source: str, reading: Reading) -> Measurement:
         raise DataError(f"{source} is a fit, whose data have been read already: leave {named} out")
     fit = load_fit(path)
     return Measurement(source, fit.dataset, fit)
+
+
+def open_compared(source: str, reading: Reading) -> Measurement:
+    """The same of what is compared with materials, which are of one wavelength: it is of few, or they were chosen."""
+    measured = open_measurement(source, reading)
+    if measured.fit is None:
+        require_choice(measured.dataset, reading, source, otherwise="each material of the library is of one")
+    return measured
 
 
 def open_pixels(source: str) -> xr.Dataset | None:
