@@ -224,3 +224,24 @@ def test_tables_of_labels_that_are_refused(refused, tmp_path):
     assert "line 2: absent.csv: there is no such file" in table("material,file\nwhite,absent.csv\n")
     (tmp_path / "labels.csv").unlink()
     assert "labels.csv: cannot be read" in refused("identify", "--calibrate", "labels.csv")
+
+
+def test_what_to_measure_next(run, tmp_path):
+    """One reading leaves several materials: the answer says which reading would tell them apart."""
+    pbrdf.write(measured(pbrdf.load_paint("cd-back")).isel(geometry=[1]), tmp_path / "one.nc")
+    printed = " ".join(run("identify", "one.nc", "--gain", "unknown", "--noise", "5%").stdout.split())
+    assert "Next measurement: I, Q, U at θi" in printed
+    assert "bits that are open" in printed
+    without = run("identify", "one.nc", "--gain", "unknown", "--noise", "5%", "--no-next").stdout
+    assert "Next measurement" not in without
+    assert "Next measurement" not in run("identify", "white").stdout  # nothing to tell apart
+
+
+@pytest.mark.slow
+def test_what_to_measure_next_in_the_folder(run, tmp_path):
+    pbrdf.write(measured(pbrdf.load_paint("cd-back")).isel(geometry=[1]), tmp_path / "one.nc")
+    run("identify", "one.nc", "--gain", "unknown", "-o", "out", "-q")
+    record = json.loads((tmp_path / "out" / "identification.json").read_text(encoding="utf-8"))
+    best = record["next_measurement"]["geometries"][0]
+    assert 0.0 < best["expected_bits"] <= record["next_measurement"]["open_bits"]
+    assert (tmp_path / "out" / "next.png").stat().st_size > 10_000

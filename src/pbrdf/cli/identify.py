@@ -86,6 +86,13 @@ def identify(
         float,
         typer.Option(help="Maps: smooth over so many pixels first, where materials fill regions.", min=0.0),
     ] = 0.0,
+    following: Annotated[
+        bool,
+        typer.Option(
+            "--next/--no-next",
+            help="Where several materials remain: say which measurement would tell them apart best.",
+        ),
+    ] = True,
     calibrate: Annotated[
         Path | None,
         typer.Option(
@@ -178,6 +185,7 @@ def identify(
         settings,
         figure_format if figures else None,
         quiet,
+        following,
     )
     if calibrate is not None:
         _calibrate(request, calibrate, library, output)
@@ -207,12 +215,14 @@ class _Request:
     settings: dict[str, Any]
     drawn: str | None
     quiet: bool
+    following: bool
 
 
 def _one(request: _Request, source: str, folder: Path | None) -> None:
     """Identify one measurement."""
     from pbrdf.files.digest import sha256_of
     from pbrdf.identification.identify import identify as identify_dataset
+    from pbrdf.identification.telling_apart import next_measurement
     from pbrdf.report.identification.folder import write_identification
     from pbrdf.report.identification.subject import Identified
     from pbrdf.report.identification.summary import print_summary
@@ -230,9 +240,20 @@ def _one(request: _Request, source: str, folder: Path | None) -> None:
             **request.asked,
         ),
     )
+    following = None
+    if request.following and len(found.materials) > 1 and not (request.quiet and folder is None):
+        following = next_measurement(found)
     digest = sha256_of(Path(source)) if measured.fit is None else ""
     report = Identified(
-        found, measured.dataset, source, request.name, request.prior, request.settings, command_line(), digest
+        found,
+        measured.dataset,
+        source,
+        request.name,
+        request.prior,
+        request.settings,
+        command_line(),
+        digest,
+        following,
     )
     written = [] if folder is None else write_identification(report, folder, figure_format=request.drawn)
     if request.quiet:

@@ -12,6 +12,7 @@ compared between measurements of different numbers of geometries.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -99,6 +100,15 @@ class Calibration:
             else:
                 result[:, c] = scores[:, c]
         return result
+
+    def least_scores(self, confidence: float) -> np.ndarray:
+        """Smallest scores with which a set of this confidence still holds each material, (C,); 0: it always does."""
+        least = np.full(len(self.scores), 1.0 - confidence)
+        for c, own in enumerate(self.scores):
+            if len(own):
+                rank = math.floor(round((1.0 - confidence) * (len(own) + 1), 9))
+                least[c] = own[rank - 1] if rank else 0.0
+        return least
 
 
 def calibrate(

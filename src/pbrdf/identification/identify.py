@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -84,7 +84,7 @@ class Identification:
     data
         The measurement as it was compared.
     library
-        The library.
+        The library, with the calibration that was used.
     temperature
         What logarithms of likelihoods were divided by.
     """
@@ -209,7 +209,7 @@ def identify_observations(
         noise=noise,
         calibration=words,
         data=observed,
-        library=library,
+        library=library if calibration is None else replace(library, calibration=calibration),
         temperature=1.0 if used is None else used.temperature,
     )
 

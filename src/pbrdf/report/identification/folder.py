@@ -34,6 +34,11 @@ _CAPTIONS = {
         "Lines: the specimen that this measurement makes most likely. The last column is the nearest material outside "
         "the set, if there is one.",
     ),
+    "next": (
+        "What one reading more is expected to tell, by its geometry.",
+        "In the plane of incidence; view angles on the side of the source are negative. Star: the best geometry. "
+        "Crosses: measured so far.",
+    ),
     "classes": (
         "The material of each pixel and its probability.",
         "The probability is that of the material told, given that it is one of the library. Black: like none of the "
@@ -75,6 +80,7 @@ def write_identification(
         If the folder cannot be written.
     """
     from pbrdf.report.identification.bands_figure import bands_figure
+    from pbrdf.report.identification.next_reading import next_figure, next_record
 
     found = report.found
     record = {
@@ -104,6 +110,11 @@ def write_identification(
         "rests_on": rests_on(report),
     }
     draw = {"bands": lambda: bands_figure(report)}
+    if (following := report.next_measurement) is not None:
+        record["next_measurement"] = next_record(following)
+        draw["next"] = lambda: next_figure(
+            following, found.data, "one reading more, in the plane of incidence"
+        )
     return _write(report, directory, "identification.json", record, draw, page_text, figure_format)
 
 

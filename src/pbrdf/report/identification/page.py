@@ -23,6 +23,7 @@ from pbrdf.report.identification.classified import (
     classes_rest_on,
     classes_sentence,
 )
+from pbrdf.report.identification.next_reading import NEXT_HEADINGS, next_rows, next_sentence
 from pbrdf.report.identification.subject import HEADINGS, Identified, level_of, rests_on, rows_of, sentence
 from pbrdf.report.page import (
     Section,
@@ -86,6 +87,7 @@ def page_text(report: Identified, figures: Mapping[str, Markup], files: Sequence
         [
             Section("Candidates", [candidates]),
             Section("The data over what specimens would show", _drawn(figures, "bands")),
+            *_next(report, figures),
             Section("What it rests on", [bullets(rests_on(report))]),
             Section("What was measured", measured),
             _repeat(
@@ -99,6 +101,22 @@ def page_text(report: Identified, figures: Mapping[str, Markup], files: Sequence
         footer=_footer(),
         navigation=True,
     )
+
+
+def _next(report: Identified, figures: Mapping[str, Markup]) -> list[Section]:
+    """What to measure next, where there is something to tell apart."""
+    found = report.next_measurement
+    if found is None:
+        return []
+    readings = table(
+        "Geometries that differ by 5° or more, the best first: expected information on the material of one reading "
+        "more, how often the most probable material is then the true one, and how many candidates are left in the set.",
+        NEXT_HEADINGS,
+        next_rows(found),
+        numeric=range(len(NEXT_HEADINGS)),
+    )
+    pieces = [paragraph(next_sentence(found)), *_drawn(figures, "next"), readings]
+    return [Section("Which measurement would tell them apart", pieces)]
 
 
 def classes_page(report: Classified, figures: Mapping[str, Markup], files: Sequence[str]) -> str:

@@ -17,6 +17,8 @@ from pbrdf.report.numbers import brief, per_cent
 if TYPE_CHECKING:
     import xarray as xr
 
+    from pbrdf.identification.telling_apart import NextMeasurement
+
 __all__ = [
     "HEADINGS",
     "Identified",
@@ -64,6 +66,9 @@ class Identified:
         The command line, where there was one.
     sha256
         That of the file; empty where the data came from elsewhere.
+    next_measurement
+        Which reading would tell the remaining candidates apart; None where there is nothing to tell or none was asked
+        for.
     """
 
     found: Identification
@@ -74,6 +79,7 @@ class Identified:
     settings: Mapping[str, Any] = field(default_factory=dict)
     command: str = ""
     sha256: str = ""
+    next_measurement: NextMeasurement | None = None
 
 
 def sentence(found: Identification) -> str:

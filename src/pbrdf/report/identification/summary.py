@@ -21,6 +21,7 @@ from pbrdf.report.identification.classified import (
     classes_rest_on,
     classes_sentence,
 )
+from pbrdf.report.identification.next_reading import next_sentence
 from pbrdf.report.identification.subject import HEADINGS, Identified, rests_on, rows_of, sentence
 from pbrdf.report.printing import bare_table, print_parts, printing_console
 
@@ -36,7 +37,8 @@ def print_summary(report: Identified, console: Console) -> None:
     """Print the set, the table of candidates, and the sentences."""
     name = short_name(report.name, report.dataset)
     heading = f"{name}: {sentence(report.found)}"
-    _print(heading, HEADINGS, (1, 2), rows_of(report.found), rests_on(report), console)
+    following = [] if report.next_measurement is None else [next_sentence(report.next_measurement), ""]
+    _print(heading, HEADINGS, (1, 2), rows_of(report.found), [*following, *rests_on(report)], console)
 
 
 def print_classes(report: Classified, console: Console) -> None:
