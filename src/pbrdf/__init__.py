@@ -26,7 +26,8 @@ if TYPE_CHECKING:
     from pbrdf.data.paints import PAINTS, load_paint, open_experiment
     from pbrdf.data.readers import register_reader
     from pbrdf.identification.class_map import identify_map
-    from pbrdf.identification.identify import calibrate_library, identify
+    from pbrdf.identification.identify import identify
+    from pbrdf.identification.labelled import calibrate_library
     from pbrdf.identification.library import Library, bundled_library, read_library
     from pbrdf.identification.material import material_from_fits, material_from_model
     from pbrdf.identification.telling_apart import next_measurement
@@ -140,7 +141,7 @@ _HOME = {
     # which material it is
     "identify": "pbrdf.identification.identify",
     "identify_map": "pbrdf.identification.class_map",
-    "calibrate_library": "pbrdf.identification.identify",
+    "calibrate_library": "pbrdf.identification.labelled",
     "Library": "pbrdf.identification.library",
     "read_library": "pbrdf.identification.library",
     "bundled_library": "pbrdf.identification.library",

@@ -7,7 +7,8 @@ import pytest
 
 import pbrdf
 from pbrdf.errors import FitError
-from pbrdf.identification.identify import calibrate_library, identify, unknown_gain
+from pbrdf.identification.identify import identify, unknown_gain
+from pbrdf.identification.labelled import calibrate_library
 from pbrdf.identification.library import Library, bundled_library
 
 LIBRARY = bundled_library()

@@ -168,6 +168,12 @@ class Reliability:
         gap = np.abs(self.confidence[filled] - self.accuracy[filled])
         return float((gap * self.count[filled]).sum() / max(int(self.count.sum()), 1))
 
+    @property
+    def right(self) -> float:
+        """Part of all measurements whose most probable material is the true one."""
+        filled = self.count > 0
+        return float((self.accuracy[filled] * self.count[filled]).sum() / max(int(self.count.sum()), 1))
+
 
 def reliability(probability: np.ndarray, truth: np.ndarray, bins: int = BINS) -> Reliability:
     """Reliability of probabilities (B, C) for the true materials (B,)."""

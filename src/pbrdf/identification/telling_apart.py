@@ -123,12 +123,16 @@ def next_measurement(
     Raises
     ------
     FitError
-        If the library has fewer than two materials, or ``noise`` is not above 0.
+        If the library has fewer than two materials, ``noise`` is not above 0, or parameters of a fit were identified.
     """
     if noise is not None and not (math.isfinite(noise) and noise > 0.0):
         raise FitError(f"noise={noise:g}: give the next reading's as a part of its intensity, like 0.01")
     materials, probability = _remaining(identification)
     data = identification.data
+    if data is None:
+        raise FitError(
+            "fitted parameters were identified: what to measure next is told where the data are at hand"
+        )
     protocol = _protocol(geometries, materials)
     form = _at(protocol, data)
     parts = _parts(data) if noise is None else np.array([(noise, 0.0)] * len(data.channels))
@@ -141,7 +145,7 @@ def next_measurement(
         covariance[:, c] = J @ np.linalg.inv(information[0]) @ J.transpose(0, 2, 1)
     variance, bright = _noise(mean, probability, data, parts)
     covariance = identification.temperature * (covariance + variance[..., None] * np.eye(shape[-1]))
-    limit = _limits(identification, materials)
+    limit = _limits(identification, materials, len(data.channels))
     information, right, left = expected_information(
         probability, *_as_ratios(mean, covariance, bright, data), limit
     )
@@ -209,7 +213,7 @@ def expected_information(
     return np.maximum(information, 0.0) / math.log(2.0), right, left
 
 
-def _limits(identification: Identification, materials: Sequence[Material]) -> np.ndarray:
+def _limits(identification: Identification, materials: Sequence[Material], channels: int) -> np.ndarray:
     """Squared distances of the next reading, over the temperature, beyond which materials leave the set; (C,)."""
     from scipy.special import gammainccinv
 
@@ -218,7 +222,7 @@ def _limits(identification: Identification, materials: Sequence[Material]) -> np
     if used is not None:
         names = list(used.names)
         least = used.least_scores(identification.confidence)[[names.index(m.name) for m in materials]]
-    freedom = identification.degrees_of_freedom + len(identification.data.channels)
+    freedom = identification.degrees_of_freedom + channels
     so_far = np.array([identification[material.name].distance for material in materials])
     return np.asarray((2.0 * gammainccinv(0.5 * freedom, least) - so_far) / identification.temperature)
 

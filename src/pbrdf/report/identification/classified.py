@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+from pbrdf.identification.confusion import Confusion
 from pbrdf.identification.library import Library
 from pbrdf.report.identification.class_figure import ClassCount, class_counts
 from pbrdf.report.identification.subject import (
@@ -44,6 +45,10 @@ class Classified:
         Whether each pixel's intensities were taken with a factor that is not known; None for a map of parameters.
     simulated
         Whether a model produced the data of the map.
+    labelled
+        What pixels of known materials were taken for; None where no labels were given.
+    labels
+        What to call the labels.
     prior, settings, command
         As of :class:`pbrdf.report.identification.subject.Identified`.
     """
@@ -54,6 +59,8 @@ class Classified:
     library: str
     gain: bool | None = None
     simulated: bool = False
+    labelled: Confusion | None = None
+    labels: str = ""
     prior: Mapping[str, float] = field(default_factory=dict)
     settings: Mapping[str, Any] = field(default_factory=dict)
     command: str = ""

@@ -29,13 +29,13 @@ _LITTLE = 0.25
 
 def next_sentence(found: NextMeasurement) -> str:
     """The best reading, what it is expected to tell and how many candidates it would leave."""
-    count = len(found.materials)
-    bits, left = found.information[0], found.expected_left[0]
-    at = _angles(found, 0)
+    bits = found.information[0]
+    theta_i, theta_r, phi = _angles(found, 0)
     told = (
-        f"Next measurement: {', '.join(found.channels)} at θi {at[0]}, θr {at[1]}, φ {at[2]} would tell them apart best, "
-        f"by an expected {_bits(bits)} of the {_bits(found.entropy)} bits that are open; of {count} candidates it would "
-        f"leave {_number(left)} on average."
+        f"Next measurement: {', '.join(found.channels)} at θi {theta_i}, θr {theta_r}, φ {phi} would tell them apart "
+        f"best, by an expected {_bits(bits)} of the {_bits(found.entropy)} bits that are open; of "
+        f"{len(found.materials)} "
+        f"candidates it would leave {_number(found.expected_left[0])} on average."
     )
     if bits < _LITTLE * found.entropy:
         told += " No single reading tells them apart well."

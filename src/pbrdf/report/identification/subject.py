@@ -5,18 +5,21 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from pbrdf.identification.identify import Candidate, Identification
 from pbrdf.identification.library import Library
+from pbrdf.report.dataset.describe import short_name
 from pbrdf.report.identification.library_summary import scatter_in_words
 from pbrdf.report.numbers import brief, per_cent
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from pbrdf.identification.fitted_parameters import FittedParameters
     from pbrdf.identification.telling_apart import NextMeasurement
 
 __all__ = [
@@ -53,7 +56,7 @@ class Identified:
     found
         What was found.
     dataset
-        The measurement.
+        The measurement; None where only fitted parameters were at hand.
     name
         What to call it: a file, a folder or a bundled paint.
     library
@@ -69,10 +72,12 @@ class Identified:
     next_measurement
         Which reading would tell the remaining candidates apart; None where there is nothing to tell or none was asked
         for.
+    fitted
+        The fitted parameters that were compared in place of data.
     """
 
     found: Identification
-    dataset: xr.Dataset
+    dataset: xr.Dataset | None
     name: str
     library: str
     prior: Mapping[str, float] = field(default_factory=dict)
@@ -80,6 +85,19 @@ class Identified:
     command: str = ""
     sha256: str = ""
     next_measurement: NextMeasurement | None = None
+    fitted: FittedParameters | None = None
+
+    @property
+    def title(self) -> str:
+        """What to call it in a heading."""
+        return Path(self.name).name if self.dataset is None else short_name(self.name, self.dataset)
+
+    @property
+    def simulated(self) -> bool:
+        """Whether a model produced the data."""
+        if self.dataset is None:
+            return self.fitted is not None and self.fitted.simulated
+        return bool(self.dataset.attrs.get("simulated"))
 
 
 def sentence(found: Identification) -> str:
@@ -141,6 +159,13 @@ def rests_on(report: Identified) -> list[str]:
     """Sentences on what the answer rests on."""
     found = report.found
     lines = [calibration_sentence(found.library), scatter_sentence(found.library)]
+    if found.data is None:
+        lines.append(
+            "From fitted parameters, as the data were not at hand: what the fit says of their errors counts as it "
+            "stands, "
+            "and a misfit of its model is not seen."
+        )
+        return [*lines, prior_in_words(report.prior)]
     if all("_over_" in name or name == "dolp" for name in found.data.channels):
         lines.append("Gain: the data are ratios, which no gain touches.")
     elif found.gain:
@@ -206,7 +231,7 @@ def prior_in_words(prior: Mapping[str, float]) -> str:
 
 
 def _other_wavelength(report: Identified) -> list[str]:
-    if "wavelength" not in report.dataset.coords:
+    if report.dataset is None or "wavelength" not in report.dataset.coords:
         return []
     own = report.dataset["wavelength"].values
     own = own[np.isfinite(own)]
