@@ -264,6 +264,12 @@ def _one(request: _Request, source: str, folder: Path | None) -> None:
         )
     options = {"confidence": request.confidence, "prior": request.prior, **request.asked}
     fitted = open_parameters(source, request.reading)
+    if fitted is not None and (
+        given := [f"--{name}" for name, value in request.asked.items() if value is not None]
+    ):
+        raise PbrdfError(
+            f"{', '.join(given)}: {source} holds fitted parameters without their data, which need none: leave it out"
+        )
     measured = None if fitted is not None else open_measurement(source, request.reading)
     one = measured.fit if measured is not None and measured.fit is not None else fitted
     if one is not None:

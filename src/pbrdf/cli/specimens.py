@@ -56,10 +56,15 @@ def open_measurement(source: str, reading: Reading) -> Measurement:
     PbrdfError
         If it is none of these, or options of reading are given for a fit.
     """
+    from pbrdf.identification.fitted_parameters import RECORD
     from pbrdf.inversion.stored_result import FILE_NAME, load_fit
 
     path = Path(source)
     if not (path.name == FILE_NAME and path.is_file()) and not (path / FILE_NAME).is_file():
+        if (path / RECORD).is_file():
+            raise DataError(
+                f"{source}: the folder of a fit without its {FILE_NAME}, which holds the data: fit again"
+            )
         return Measurement(source, reading.open(source))
     _require_not_read(source, reading)
     fit = load_fit(path)

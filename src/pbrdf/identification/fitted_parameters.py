@@ -19,6 +19,7 @@ import numpy as np
 from pbrdf.errors import DataError, FitError, ModelError
 from pbrdf.files.text import read_bytes, utf8
 from pbrdf.identification.evidence import Evidence
+from pbrdf.identification.identify import arbitrary_scale
 from pbrdf.identification.material import Material
 from pbrdf.identification.pixels import of_parameters
 from pbrdf.models import load_model
@@ -28,8 +29,6 @@ __all__ = ["RECORD", "FittedParameters", "parameters_explained", "read_fitted_pa
 
 #: Name of the file in the folder of a fit.
 RECORD = "fit.json"
-#: Quantities whose scale is not known, so that amplitudes say nothing.
-_ARBITRARY = ("radiance", "dn")
 
 
 @dataclass(frozen=True)
@@ -49,8 +48,8 @@ class FittedParameters:
         Shape (P, P); 0 where there is none.
     data
         What the fit calls its data.
-    quantity
-        What was measured, see :mod:`pbrdf.data.schema`.
+    arbitrary
+        Whether a factor of the intensities was not known, and the fit had none.
     simulated
         Whether a model produced the data.
     """
@@ -61,7 +60,7 @@ class FittedParameters:
     standard_error: np.ndarray
     correlation: np.ndarray
     data: str = ""
-    quantity: str = ""
+    arbitrary: bool = False
     simulated: bool = False
 
 
@@ -124,8 +123,9 @@ def _fitted(record: Mapping[str, Any]) -> FittedParameters:
         standard_error=np.where(determined, error, math.nan),
         correlation=np.nan_to_num(correlation),
         data=str(data["name"]),
-        quantity=str(data.get("quantity", "")),
-        simulated="SIMULATED" in str(data.get("source", "")),
+        arbitrary=arbitrary_scale(data.get("quantity"), data.get("scale"))
+        and "gain" not in [name.partition("[")[0] for name in names],
+        simulated=bool(data.get("simulated")),
     )
 
 
@@ -158,11 +158,11 @@ def parameters_explained(materials: Sequence[Material], fitted: FittedParameters
 
 
 def _require_like(materials: Sequence[Material], fitted: FittedParameters) -> None:
-    if fitted.quantity in _ARBITRARY:
+    if fitted.arbitrary:
         raise FitError(
-            f"the scale of the fitted data ({fitted.quantity}) is arbitrary, and the parameters hold it: identify the "
-            "data, "
-            "which can be compared up to a gain"
+            "the scale of the fitted data is arbitrary, and the parameters hold it: identify the data, which are "
+            "compared "
+            "up to a gain, or fit with --nuisance gain"
         )
     for material in materials:
         space = material.space

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Candidate",
     "Identification",
+    "arbitrary_scale",
     "check_request",
     "identification_of",
     "identify",
@@ -118,12 +119,15 @@ class Identification:
 
 def unknown_gain(dataset: xr.Dataset) -> bool:
     """Whether a factor of the intensities is not known: their scale is arbitrary, or they are radiances or counts."""
-    quantity = dataset.attrs["quantity"]
+    return arbitrary_scale(dataset.attrs["quantity"], dataset.attrs.get("scale"))
+
+
+def arbitrary_scale(quantity: str | None, scale: str | None) -> bool:
+    """Whether data of this quantity, with what is stated of their scale, have an unknown factor."""
     if quantity == NORMALISED:
         return False
-    stated = dataset.attrs.get("scale")
-    if stated is not None:
-        return bool(stated == "arbitrary")
+    if scale is not None:
+        return scale == "arbitrary"
     return quantity in ("radiance", "dn")
 
 

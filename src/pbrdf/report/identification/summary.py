@@ -94,4 +94,4 @@ def _print(
         table.add_column(column, justify="right" if k in numeric else "left")
     for row in rows:
         table.add_row(*map(Text, row))
-    print_parts([heading, "", table, "", *lines], console)
+    print_parts([heading, "", table, *(["", *lines] if lines else [])], console)
