@@ -337,6 +337,9 @@ def _every_pixel(request: _Request, source: str, pixels: xr.Dataset, folder: Pat
                 progress=progress,
             ),
         )
+    judged = (
+        None if labels is None else _told(f"--labelled {given_labels}", lambda: judge_pixels(found, labels))
+    )
     free = None if fitted else unknown_gain(pixels) if gain is None else gain
     report = Classified(
         found,
@@ -345,11 +348,11 @@ def _every_pixel(request: _Request, source: str, pixels: xr.Dataset, folder: Pat
         request.name,
         free,
         bool(pixels.attrs.get("simulated")),
-        None if labels is None else _told(f"--labelled {given_labels}", lambda: judge_pixels(found, labels)),
-        str(given_labels or ""),
         request.prior,
         request.settings,
         command_line(),
+        judged,
+        "" if given_labels is None else str(given_labels),
     )
     written = [] if folder is None else write_classes(report, folder, figure_format=request.drawn)
     if request.quiet:

@@ -14,6 +14,7 @@ from matplotlib.colors import to_hex
 from pbrdf.identification.conformal import calibrate
 from pbrdf.identification.confusion import table_of
 from pbrdf.identification.cross_check import cross_checked
+from pbrdf.identification.labelled_pixels import judge_pixels
 from pbrdf.identification.library import Library, bundled_library
 from pbrdf.report.identification.calibrated import (
     Calibrated,
@@ -128,6 +129,22 @@ def test_the_folder_of_a_map(picture, tmp_path):
     assert "a common factor of each pixel" in page
     assert "Simulated data, not measured." in page
     assert "white 50 %, the others share the rest" in page
+
+
+@pytest.mark.slow
+def test_a_map_against_its_labels(picture, tmp_path):
+    truth = xr.DataArray(
+        [["white", "white", "white", ""], ["white", "cd-back", "cd-back", "white"]], dims=("y", "x")
+    )
+    table = judge_pixels(picture, truth)
+    report = Classified(picture, "map.nc", LIBRARY, "the bundled paints", labelled=table, labels="truth.npy")
+    files = write_classes(report, tmp_path / "out", figure_format="svg")
+    assert {"confusion.svg", "reliability.svg"} <= {f.name for f in files}
+    record = json.loads((tmp_path / "out" / "classes.json").read_text(encoding="utf-8"))
+    assert record["labelled"]["labels"] == "truth.npy"
+    assert np.sum(record["labelled"]["confusion"]) == 6
+    assert "of 6 labelled pixels" in files[0].read_text(encoding="utf-8")
+    assert "truth.npy: of 6 labelled pixels" in summary_text(report)
 
 
 def test_reliability(calibrated):

@@ -45,12 +45,12 @@ class Classified:
         Whether each pixel's intensities were taken with a factor that is not known; None for a map of parameters.
     simulated
         Whether a model produced the data of the map.
+    prior, settings, command
+        As of :class:`pbrdf.report.identification.subject.Identified`.
     labelled
         What pixels of known materials were taken for; None where no labels were given.
     labels
         What to call the labels.
-    prior, settings, command
-        As of :class:`pbrdf.report.identification.subject.Identified`.
     """
 
     found: xr.Dataset
@@ -59,11 +59,11 @@ class Classified:
     library: str
     gain: bool | None = None
     simulated: bool = False
-    labelled: Confusion | None = None
-    labels: str = ""
     prior: Mapping[str, float] = field(default_factory=dict)
     settings: Mapping[str, Any] = field(default_factory=dict)
     command: str = ""
+    labelled: Confusion | None = None
+    labels: str = ""
 
     @cached_property
     def counts(self) -> list[ClassCount]:
