@@ -13,6 +13,7 @@ from pbrdf.errors import DataError
 if TYPE_CHECKING:
     import xarray as xr
 
+    from pbrdf.identification.fitted_parameters import FittedParameters
     from pbrdf.identification.library import Library
     from pbrdf.inversion.result import FitResult
 
@@ -24,6 +25,7 @@ __all__ = [
     "open_compared",
     "open_library",
     "open_measurement",
+    "open_parameters",
     "open_pixels",
 ]
 
@@ -67,16 +69,47 @@ def open_measurement(source: str, reading: Reading) -> Measurement:
     PbrdfError
         If it is none of these, or options of reading are given for a fit.
     """
+    from pbrdf.identification.fitted_parameters import RECORD
     from pbrdf.inversion.stored_result import FILE_NAME, load_fit
 
     path = Path(source)
     if not (path.name == FILE_NAME and path.is_file()) and not (path / FILE_NAME).is_file():
+        if (path / RECORD).is_file():
+            raise DataError(
+                f"{source}: the folder of a fit without its {FILE_NAME}, which holds the data: fit again"
+            )
         return Measurement(source, reading.open(source))
+    _require_not_read(source, reading)
+    fit = load_fit(path)
+    return Measurement(source, fit.dataset, fit)
+
+
+def open_parameters(source: str, reading: Reading) -> FittedParameters | None:
+    """A fit of which only the parameters are there: ``fit.json`` alone or in a folder without ``fit.nc``; None else.
+
+    Raises
+    ------
+    PbrdfError
+        If it cannot be read, or options of reading are given for it.
+    """
+    from pbrdf.identification.fitted_parameters import RECORD, FittedParameters
+    from pbrdf.identification.identify_fit import open_fit
+    from pbrdf.inversion.stored_result import FILE_NAME
+
+    path = Path(source)
+    alone = path.suffix.lower() == ".json" and path.is_file()
+    if not alone and not ((path / RECORD).is_file() and not (path / FILE_NAME).is_file()):
+        return None
+    _require_not_read(source, reading)
+    found = open_fit(path)
+    assert isinstance(found, FittedParameters)
+    return found
+
+
+def _require_not_read(source: str, reading: Reading) -> None:
     if given := reading.stated():
         named = ", ".join("--" + name.replace("_", "-") for name in given)
         raise DataError(f"{source} is a fit, whose data have been read already: leave {named} out")
-    fit = load_fit(path)
-    return Measurement(source, fit.dataset, fit)
 
 
 def open_compared(source: str, reading: Reading) -> Measurement:

@@ -16,7 +16,6 @@ from pbrdf.identification.material import Material
 from pbrdf.identification.predictive import specimens_shown, typical_gains
 from pbrdf.inversion.observations import Observations
 from pbrdf.report.dataset.cuts import Cut
-from pbrdf.report.dataset.describe import short_name
 from pbrdf.report.dataset.panels import VIEWING_ANGLE, channel_label, scale_intensity, scale_signed
 from pbrdf.report.dataset.points import Points
 from pbrdf.report.dataset.quantities import channels_behind, is_intensity, quantity_of
@@ -53,6 +52,7 @@ def shown_candidates(report: Identified) -> list[Candidate]:
 
 def bands_figure(report: Identified) -> Figure:
     """The measurement over the band of each shown candidate: a column a candidate, a row a quantity."""
+    assert report.dataset is not None  # of fitted parameters there is another figure
     points = Points.from_dataset(report.dataset)
     whole = shown_cuts(points)
     cuts = _few(whole.cuts)
@@ -63,8 +63,7 @@ def bands_figure(report: Identified) -> Figure:
     at = _along(report, cuts)
     with styled():
         handles = _handles(ShownCuts(cuts, looks, whole.found), report)
-        title = short_name(report.name, report.dataset)
-        figure, axes = panels(len(names), len(candidates), _PANEL, title, handles)
+        figure, axes = panels(len(names), len(candidates), _PANEL, report.title, handles)
         shared: dict[str, tuple[float, float]] = {}
         for column, candidate in enumerate(candidates):
             bands = _bands(report, candidate, at, names)
@@ -110,6 +109,7 @@ def _few(cuts: list[Cut]) -> list[Cut]:
 def _along(report: Identified, cuts: list[Cut]) -> Observations:
     """Geometries at which specimens are shown: along the cuts, or the measured ones."""
     data = report.found.data
+    assert data is not None
     theta_i, theta_r, phi = data.theta_i, data.theta_r, data.phi
     if cuts:
         theta_i, theta_r, phi = (
@@ -130,8 +130,8 @@ def _bands(
     likely = np.array([[candidate.values[name] for name in material.space.names]])
     parameters = np.concatenate([likely, drawn])
     shown = _quantities(material, parameters, at, names)
-    if report.found.gain:
-        gains = typical_gains(material, parameters, report.found.data)
+    if report.found.gain and (data := report.found.data) is not None:
+        gains = typical_gains(material, parameters, data)
         shown = {n: v * gains[:, None] if is_intensity(n) else v for n, v in shown.items()}
     ends = 0.5 * (1.0 - PART), 0.5 * (1.0 + PART)
     return {n: (*np.quantile(v[1:], ends, axis=0), v[0]) for n, v in shown.items()}

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+from pbrdf.identification.confusion import Confusion
 from pbrdf.identification.library import Library
 from pbrdf.inversion.noise import NoiseModel, parse_noise
 from pbrdf.report.identification.class_figure import ClassCount, class_counts
@@ -50,6 +51,10 @@ class Classified:
         Whether a model produced the data of the map.
     prior, settings, command
         As of :class:`pbrdf.report.identification.subject.Identified`.
+    labelled
+        What pixels of known materials were taken for; None where no labels were given.
+    labels
+        What to call the labels.
     """
 
     found: xr.Dataset
@@ -61,6 +66,8 @@ class Classified:
     prior: Mapping[str, float] = field(default_factory=dict)
     settings: Mapping[str, Any] = field(default_factory=dict)
     command: str = ""
+    labelled: Confusion | None = None
+    labels: str = ""
 
     @cached_property
     def counts(self) -> list[ClassCount]:

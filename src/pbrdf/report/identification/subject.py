@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,11 +14,15 @@ from pbrdf.identification.identify import Candidate, Identification
 from pbrdf.identification.library import Library
 from pbrdf.identification.material import Material
 from pbrdf.identification.specimen_fits import relative_noise
+from pbrdf.report.dataset.describe import short_name
 from pbrdf.report.identification.library_summary import scatter_in_words
 from pbrdf.report.numbers import brief, per_cent
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from pbrdf.identification.fitted_parameters import FittedParameters
+    from pbrdf.identification.telling_apart import NextMeasurement
 
 __all__ = [
     "CAUTION",
@@ -60,7 +65,7 @@ class Identified:
     found
         What was found.
     dataset
-        The measurement.
+        The measurement; None where only fitted parameters were at hand.
     name
         What to call it: a file, a folder or a bundled paint.
     library
@@ -73,16 +78,35 @@ class Identified:
         The command line, where there was one.
     sha256
         That of the file; empty where the data came from elsewhere.
+    next_measurement
+        Which reading would tell the remaining candidates apart; None where there is nothing to tell or none was asked
+        for.
+    fitted
+        The fitted parameters that were compared in place of data.
     """
 
     found: Identification
-    dataset: xr.Dataset
+    dataset: xr.Dataset | None
     name: str
     library: str
     prior: Mapping[str, float] = field(default_factory=dict)
     settings: Mapping[str, Any] = field(default_factory=dict)
     command: str = ""
     sha256: str = ""
+    next_measurement: NextMeasurement | None = None
+    fitted: FittedParameters | None = None
+
+    @property
+    def title(self) -> str:
+        """What to call it in a heading."""
+        return Path(self.name).name if self.dataset is None else short_name(self.name, self.dataset)
+
+    @property
+    def simulated(self) -> bool:
+        """Whether a model produced the data."""
+        if self.dataset is None:
+            return self.fitted is not None and self.fitted.simulated
+        return bool(self.dataset.attrs.get("simulated"))
 
 
 def sentence(found: Identification) -> str:
@@ -156,10 +180,17 @@ def p_value_in_words(p_value: float) -> str:
 def rests_on(report: Identified) -> list[str]:
     """Sentences on what the answer rests on."""
     found = report.found
-    lines = cautions_on(found.library, relative_noise(found.data))
+    lines = cautions_on(found.library, None if found.data is None else relative_noise(found.data))
     lines += _other_wavelength(report)
     lines.append(f"Library: {library_in_words(report.library, found.library)}.")
     lines += [calibration_sentence(found.library, found.confidence), scatter_sentence(found.library)]
+    if found.data is None:
+        lines.append(
+            "From fitted parameters, as the data were not at hand: what the fit says of their errors counts as it "
+            "stands, "
+            "and a misfit of its model is not seen."
+        )
+        return [*lines, _probabilities(report)]
     if all("_over_" in name or name == "dolp" for name in found.data.channels):
         lines.append("Gain: the data are ratios, which no gain touches.")
     elif found.gain:
@@ -179,13 +210,14 @@ def rests_on(report: Identified) -> list[str]:
             else "."
         )
     )
-    if found.far_from_all:
-        lines.append(
-            "Probabilities: none. They would say which material it is if it is one of these, and it is unlike all."
-        )
-    else:
-        lines.append(prior_in_words(report.prior))
-    return lines
+    return [*lines, _probabilities(report)]
+
+
+def _probabilities(report: Identified) -> str:
+    """What probabilities count on, or that they say nothing."""
+    if report.found.far_from_all:
+        return "Probabilities: none. They would say which material it is if it is one of these, and it is unlike all."
+    return prior_in_words(report.prior)
 
 
 def library_in_words(name: str, library: Library) -> str:
@@ -307,7 +339,7 @@ def prior_in_words(prior: Mapping[str, float]) -> str:
 
 
 def _other_wavelength(report: Identified) -> list[str]:
-    if "wavelength" not in report.dataset.coords:
+    if report.dataset is None or "wavelength" not in report.dataset.coords:
         return []
     own = report.dataset["wavelength"].values
     own = own[np.isfinite(own)]
