@@ -232,7 +232,7 @@ def opened_pictures(path: Path) -> xr.Dataset:
         raise DataError(
             f"{path}: is neither netCDF nor a Zarr folder, and a map is made of pictures: stokes.nc or .zarr of "
             "`pbrdf reduce`, or data with dimensions beside geometry. Measurements in a table are fitted with "
-            f"`pbrdf fit {path.name}`, raw frames reduced first: `pbrdf reduce`, or `pbrdf map --polarimeter`"
+            f"`pbrdf fit {path.name}`, raw frames reduced first by `pbrdf reduce`"
         )
     options: dict[str, Any] = {"decode_times": False, "cache": False}
     opened = open_zarr(path, **options) if path.is_dir() else open_netcdf(path, **options)
