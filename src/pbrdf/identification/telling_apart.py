@@ -146,9 +146,13 @@ def next_measurement(
     variance, bright = _noise(mean, probability, data, parts)
     covariance = identification.temperature * (covariance + variance[..., None] * np.eye(shape[-1]))
     limit = _limits(identification, materials, len(data.channels))
-    information, right, left = expected_information(
-        probability, *_as_ratios(mean, covariance, bright, data), limit
-    )
+    written = _as_ratios(mean, covariance, bright, data)
+    try:
+        information, right, left = expected_information(probability, *written, limit)
+    except np.linalg.LinAlgError as error:
+        raise FitError(
+            "what a reading would tell cannot be computed: its noise is next to nothing"
+        ) from error
     order = np.argsort(-information, kind="stable")
     return NextMeasurement(
         materials=tuple(material.name for material in materials),
