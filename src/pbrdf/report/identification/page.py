@@ -128,9 +128,7 @@ def _next(report: Identified, figures: Mapping[str, Markup]) -> list[Section]:
         return []
     readings = table(
         "Geometries that differ by 5° or more, the best first: expected information on the material of one reading "
-        "more, how often the most probable material is then the true one, and how many candidates are left in the set. "
-        "On the "
-        "flank of a lobe whose width is still open the information is less, by up to 0.2 bits.",
+        "more, how often the most probable material is then the true one, and how many candidates are left in the set.",
         NEXT_HEADINGS,
         next_rows(found),
         numeric=range(len(NEXT_HEADINGS)),
