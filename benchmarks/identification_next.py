@@ -1,8 +1,8 @@
 """What one reading more really tells of the material, against what ``next_measurement`` expects of it.
 
 Two candidates remain after a few readings of a paint. Specimens of both that these readings allow are drawn (from the
-library, weighted by their likelihood, the unknown gain with them), each is measured once more at a geometry, with noise,
-and identified with that reading too. The mean of log₂ of what the true material's probability grew by is the
+library, weighted by their likelihood, the unknown gain with them), each is measured once more at a geometry, with
+noise, and identified with that reading too. The mean of log₂ of what the true material's probability grew by is the
 information; beside it stand how often the most probable material is the true one, and how many are left in the set.
 
     python benchmarks/identification_next.py [--specimens 1000]
