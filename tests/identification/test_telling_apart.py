@@ -227,6 +227,7 @@ def test_against_simulated_specimens_and_readings():
     rng = np.random.default_rng(1)
     data, count, noise = found.data, 1000, 0.03
     chosen = {
+        (39.5, 45.5): 0.1,
         (50.0, 80.0): 0.05, (36.4, 38.6): 0.05, (50.0, 50.0): 0.05, (20.0, 45.0): 0.05, (55.0, 5.0): 0.01,
     }  # fmt: skip
     told, expected = [], []

@@ -36,7 +36,9 @@ from pbrdf.errors import DataError, FitError, PbrdfError
 if TYPE_CHECKING:
     import xarray as xr
 
+    from pbrdf.identification.identify import Identification
     from pbrdf.identification.library import Library
+    from pbrdf.identification.telling_apart import NextMeasurement
 
 __all__ = ["identify"]
 
@@ -260,7 +262,6 @@ def _one(request: _Request, source: str, folder: Path | None) -> None:
     from pbrdf.files.digest import sha256_of
     from pbrdf.identification.identify import identify as identify_dataset
     from pbrdf.identification.identify_fit import identify_fit
-    from pbrdf.identification.telling_apart import next_measurement
     from pbrdf.report.identification.folder import write_identification
     from pbrdf.report.identification.subject import Identified
     from pbrdf.report.identification.summary import print_summary
@@ -291,7 +292,7 @@ def _one(request: _Request, source: str, folder: Path | None) -> None:
     following = None
     remain = request.following and len(found.materials) > 1 and found.data is not None
     if remain and not (request.quiet and folder is None):
-        following = next_measurement(found)
+        following = _next(source, found)
     report = Identified(
         found,
         None if measured is None else measured.dataset,
@@ -310,6 +311,17 @@ def _one(request: _Request, source: str, folder: Path | None) -> None:
         return
     print_summary(report, output_console())
     _say_written(folder, written)
+
+
+def _next(source: str, found: Identification) -> NextMeasurement | None:
+    """Which reading would tell the materials apart; an answer is not lost where that cannot be told."""
+    from pbrdf.identification.telling_apart import next_measurement
+
+    try:
+        return next_measurement(found)
+    except FitError as error:
+        warn(f"{source}: what to measure next: {error}")
+        return None
 
 
 def _every_pixel(request: _Request, source: str, pixels: xr.Dataset, folder: Path | None) -> None:

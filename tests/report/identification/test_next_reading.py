@@ -42,12 +42,15 @@ def ranked():
 
 
 def test_the_sentence(ranked):
-    assert next_sentence(ranked) == (
+    assert next_sentence(ranked, 2) == (
         "Next measurement: I, Q, U at θi 40°, θr 45.5°, φ 0° would tell them apart best, by an expected 0.8 of the 1 "
         "bits that are open; of 2 candidates it would leave 1.2 on average."
     )
     little = replace(ranked, information=0.1 * ranked.information)
-    assert next_sentence(little).endswith("No single reading tells them apart well.")
+    assert next_sentence(little, 2).endswith("No single reading tells them apart well.")
+    assert "of the 2 most probable candidates it would leave 1.2" in next_sentence(ranked, 5)
+    many = replace(ranked, channels=("m00", "m01", "m10", "m11", "m22"))
+    assert "m00 … m22 at θi" in next_sentence(many, 2)
 
 
 def test_geometries_that_differ(ranked):
@@ -58,7 +61,7 @@ def test_geometries_that_differ(ranked):
 
 
 def test_the_record_is_plain_and_in_degrees(ranked):
-    record = json.loads(json.dumps(plain(next_record(ranked))))
+    record = json.loads(json.dumps(plain(next_record(ranked, 2))))
     assert record["open_bits"] == pytest.approx(1.0)
     assert record["candidates"] == {"white": 0.5, "cd-back": 0.5}
     assert record["geometries"][1] == {
@@ -87,7 +90,7 @@ def test_folder_and_text(ranked, scattered, tmp_path):
     page = (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
     assert "Which measurement would tell them apart" in page
     record = json.loads((tmp_path / "out" / "identification.json").read_text(encoding="utf-8"))
-    assert record["next_measurement"]["sentence"] == next_sentence(ranked)
+    assert record["next_measurement"]["sentence"] == next_sentence(ranked, len(scattered.found.materials))
     write_identification(scattered, tmp_path / "without", figure_format=None)
     assert "Which measurement" not in (tmp_path / "without" / "index.html").read_text(encoding="utf-8")
     assert "next_measurement" not in json.loads((tmp_path / "without" / "identification.json").read_text())

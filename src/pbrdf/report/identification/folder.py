@@ -134,7 +134,7 @@ def write_identification(
     else:
         draw["bands"] = lambda: bands_figure(report)
     if (following := report.next_measurement) is not None and (data := found.data) is not None:
-        record["next_measurement"] = next_record(following)
+        record["next_measurement"] = next_record(following, len(found.materials))
         draw["next"] = lambda: next_figure(following, data, "one reading more, in the plane of incidence")
     return _write(report, directory, "identification.json", record, draw, page_text, figure_format)
 

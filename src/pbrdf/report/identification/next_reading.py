@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pbrdf.data.schema import written
 from pbrdf.identification.telling_apart import NextMeasurement
 from pbrdf.report.numbers import brief
 from pbrdf.report.style import GREY, RED, new_figure, styled
@@ -23,19 +24,22 @@ NEXT_HEADINGS = ("θi", "θr", "φ", "expected information", "right afterwards",
 _NAMED, _APART = 5, math.radians(5.0)
 #: Sine of the azimuth below which a measured geometry counts as one of the plane of incidence.
 _IN_PLANE = 0.05
+#: Channels that are named one by one.
+_LISTED = 4
 #: What a reading tells of what is open below which one alone is said not to be enough.
 _LITTLE = 0.25
 
 
-def next_sentence(found: NextMeasurement) -> str:
-    """The best reading, what it is expected to tell and how many candidates it would leave."""
+def next_sentence(found: NextMeasurement, candidates: int) -> str:
+    """The best reading, what it is expected to tell and how many of so many candidates it would leave."""
     bits = found.information[0]
     theta_i, theta_r, phi = _angles(found, 0)
+    count = len(found.materials)
+    among = f"of {count} candidates" if count >= candidates else f"of the {count} most probable candidates"
     told = (
-        f"Next measurement: {', '.join(found.channels)} at θi {theta_i}, θr {theta_r}, φ {phi} would tell them apart "
-        f"best, by an expected {_bits(bits)} of the {_bits(found.entropy)} bits that are open; of "
-        f"{len(found.materials)} "
-        f"candidates it would leave {_number(found.expected_left[0])} on average."
+        f"Next measurement: {_read(found.channels)} at θi {theta_i}, θr {theta_r}, φ {phi} would tell them apart best, "
+        f"by an expected {_bits(bits)} of the {_bits(found.entropy)} bits that are open; {among} it would leave "
+        f"{_number(found.expected_left[0])} on average."
     )
     if bits < _LITTLE * found.entropy:
         told += " No single reading tells them apart well."
@@ -55,14 +59,14 @@ def next_rows(found: NextMeasurement) -> list[list[str]]:
     ]
 
 
-def next_record(found: NextMeasurement) -> dict[str, Any]:
+def next_record(found: NextMeasurement, candidates: int) -> dict[str, Any]:
     """The same as plain values: angles in degrees, information in bits."""
     return {
         "candidates": dict(zip(found.materials, found.probability, strict=True)),
         "open_bits": found.entropy,
         "right_now": found.right_now,
         "channels": list(found.channels),
-        "sentence": next_sentence(found),
+        "sentence": next_sentence(found, candidates),
         "geometries": [
             {
                 **{
@@ -146,6 +150,13 @@ def _different(found: NextMeasurement) -> list[int]:
 def _angles(found: NextMeasurement, g: int) -> list[str]:
     angles = (getattr(found.geometries, name)[g] for name in ("theta_i", "theta_r", "phi"))
     return [f"{math.degrees(angle):.1f}°".replace(".0°", "°") for angle in angles]
+
+
+def _read(channels: tuple[str, ...]) -> str:
+    """What is read; of many the first and the last."""
+    if len(channels) > _LISTED:
+        return f"{written(channels[0])} … {written(channels[-1])}"
+    return ", ".join(map(written, channels))
 
 
 def _bits(bits: float) -> str:

@@ -143,7 +143,11 @@ def _next(report: Identified, figures: Mapping[str, Markup]) -> list[Section]:
         next_rows(found),
         numeric=range(len(NEXT_HEADINGS)),
     )
-    pieces = [paragraph(next_sentence(found)), *_drawn(figures, "next"), readings]
+    pieces = [
+        paragraph(next_sentence(found, len(report.found.materials))),
+        *_drawn(figures, "next"),
+        readings,
+    ]
     return [Section("Which measurement would tell them apart", pieces)]
 
 

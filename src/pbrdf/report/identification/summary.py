@@ -33,7 +33,9 @@ _TEXT_WIDTH = 120
 def print_summary(report: Identified, console: Console) -> None:
     """Print the set, the table of candidates, and the sentences."""
     heading = f"{report.title}: {sentence(report.found)}"
-    following = [] if report.next_measurement is None else [next_sentence(report.next_measurement), ""]
+    following = []
+    if (best := report.next_measurement) is not None:
+        following = [next_sentence(best, len(report.found.materials)), ""]
     _print(heading, HEADINGS, (1, 2), rows_of(report.found), [*following, *rests_on(report)], console)
 
 
