@@ -271,8 +271,7 @@ def _one(request: _Request, source: str, folder: Path | None) -> None:
     if request.labelled is not None:
         raise PbrdfError(
             f"--labelled {request.labelled}: {source} is one measurement; name it in a table, file,material, and leave "
-            "it "
-            "out here"
+            "it out here"
         )
     options = {"confidence": request.confidence, "prior": request.prior, **request.asked}
     fitted = open_parameters(source, request.reading)

@@ -85,8 +85,7 @@ def read_fitted_parameters(path: Path) -> FittedParameters:
     if "estimates" not in record:
         raise DataError(
             f"{path}: a model without standard errors: nothing says how well its parameters are known. Give the folder "
-            "of "
-            f"the fit, or its {RECORD}"
+            f"of the fit, or its {RECORD}"
         )
     if not record.get("settled", True):
         raise FitError(f"{path}: the fit stands at no minimum: fit again with more starts")
@@ -161,23 +160,20 @@ def _require_like(materials: Sequence[Material], fitted: FittedParameters) -> No
     if fitted.arbitrary:
         raise FitError(
             "the scale of the fitted data is arbitrary, and the parameters hold it: identify the data, which are "
-            "compared "
-            "up to a gain, or fit with --nuisance gain"
+            "compared up to a gain, or fit with --nuisance gain"
         )
     for material in materials:
         space = material.space
         if space.model is not type(fitted.model):
             raise FitError(
                 f"the fit is of the model {fitted.model.name}, the material {material.name} of {space.model.name}: "
-                "without "
-                "its data it can be compared with materials of its own model only"
+                "without its data it can be compared with materials of its own model only"
             )
         options = {name: choices[0] for name, choices in space.model.options.items()} | dict(space.options)
         if options != dict(fitted.model.chosen):
             raise FitError(
                 f"the fit is of {fitted.model.name} with {_stated(fitted.model.chosen)}, the material {material.name} "
-                "with "
-                f"{_stated(options)}: without its data they cannot be compared"
+                f"with {_stated(options)}: without its data they cannot be compared"
             )
         if missing := [name for name in space.names if name not in fitted.names]:
             raise FitError(

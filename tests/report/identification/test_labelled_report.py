@@ -57,8 +57,7 @@ def test_the_sentence(table):
     assert confusion_sentence(table, "pixels") == (
         "of 4 labelled pixels the 95 % set held the true material for 50.0 %; the most probable was right for 75.0 %; "
         "expected calibration error 0.170; of 2 labelled pixels of materials that the library has not got 1 were told "
-        "as "
-        "none"
+        "as none"
     )
     assert level_of_sets(table) == "not"
     strangers = table_of(

@@ -59,7 +59,6 @@ def calibration_rests_on(report: Calibrated) -> list[str]:
     if few := [f"{name} ({count})" for name, count in counts.items() if 0 < count < needed]:
         lines.append(
             f"Too few of {joined(few, 'and')}: with less than {needed} a set at {100.0 * report.table.confidence:g} % "
-            "holds "
-            "a material always, whatever was measured."
+            "holds a material always, whatever was measured."
         )
     return lines

@@ -44,10 +44,8 @@ def confusion_sentence(table: Confusion, what: str) -> str:
     if table.reliability is not None:
         parts.append(
             f"of {table.total - unknown} labelled {what} the {100.0 * table.confidence:g} % set held the true material "
-            "for "
-            f"{100.0 * table.held:.1f} %; the most probable was right for {100.0 * table.reliability.right:.1f} %; "
-            "expected "
-            f"calibration error {table.reliability.error:.3f}"
+            f"for {100.0 * table.held:.1f} %; the most probable was right for {100.0 * table.reliability.right:.1f} "
+            f"%; expected calibration error {table.reliability.error:.3f}"
         )
     if unknown:
         empty = int(table.counts[table.strangers, -1].sum())

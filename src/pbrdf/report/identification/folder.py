@@ -47,8 +47,7 @@ _CAPTIONS = {
     "parameters": (
         "The fitted parameters over what specimens of each material have.",
         "Bars: the middle 95 % of the specimens of a material, red where it is not in the set. Line and band: the fit "
-        "and its "
-        "standard error; without a band the fit does not determine the parameter.",
+        "and its standard error; without a band the fit does not determine the parameter.",
     ),
     "next": (
         "What one reading more is expected to tell, by its geometry.",
@@ -67,8 +66,7 @@ _CAPTIONS = {
     "confusion": (
         "Which material was told as which.",
         "Told: the most probable material of the set. On the right, how many sets hold the true material, or are empty "
-        "where "
-        "the library has not got it.",
+        "where the library has not got it.",
     ),
 }
 

@@ -52,7 +52,6 @@ def labels_rest_on(report: LabelledReport) -> list[str]:
         lines.insert(
             1,
             "If these measurements are among those that the library was calibrated with, they flatter it; the page of "
-            "the "
-            "calibration judges each by the others.",
+            "the calibration judges each by the others.",
         )
     return lines

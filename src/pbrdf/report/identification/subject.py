@@ -187,8 +187,7 @@ def rests_on(report: Identified) -> list[str]:
     if found.data is None:
         lines.append(
             "From fitted parameters, as the data were not at hand: what the fit says of their errors counts as it "
-            "stands, "
-            "and a misfit of its model is not seen."
+            "stands, and a misfit of its model is not seen."
         )
         return [*lines, _probabilities(report)]
     if all("_over_" in name or name == "dolp" for name in found.data.channels):
