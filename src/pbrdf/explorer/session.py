@@ -20,7 +20,7 @@ from pbrdf.explorer.state import StateError, read_state
 from pbrdf.explorer.uploads import MOST_BYTES
 from pbrdf.explorer.workspace import Workspace
 
-__all__ = ["REQUESTS", "VIEWS", "Emit", "Session"]
+__all__ = ["REQUESTS", "VIEWS", "Emit", "Session", "get_ready"]
 
 #: Sends a JSON object and buffers to the page, from any thread.
 Emit = Callable[[Mapping[str, Any], Sequence[bytes | memoryview]], None]
@@ -49,6 +49,13 @@ _MOST_WAITING = 64
 _FAULT = "an error of the explorer; the terminal says more"
 
 _log = logging.getLogger(__name__)
+
+
+def get_ready() -> None:
+    """Load what the first page asks for before it shows pictures."""
+    catalogue()
+    for module in (*VIEWS.values(), REQUESTS["data"]):
+        import_module(module)
 
 
 class Session:
