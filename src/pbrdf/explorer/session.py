@@ -22,7 +22,7 @@ from pbrdf.explorer.state import StateError, read_state
 from pbrdf.explorer.uploads import MOST_BYTES
 from pbrdf.explorer.workspace import Workspace
 
-__all__ = ["REQUESTS", "VIEWS", "Emit", "Session", "prepared"]
+__all__ = ["REQUESTS", "VIEWS", "Emit", "Session", "get_ready"]
 
 #: Sends a JSON object and buffers to the page, from any thread.
 Emit = Callable[[Mapping[str, Any], Sequence[bytes | memoryview]], None]
@@ -61,6 +61,13 @@ def prepared() -> dict[str, Any]:
     """The catalogue, put together once: whoever asks meanwhile waits for it."""
     with _preparing:
         return catalogue()
+
+
+def get_ready() -> None:
+    """Load what the first page asks for before it shows pictures."""
+    prepared()
+    for module in (*VIEWS.values(), REQUESTS["data"]):
+        import_module(module)
 
 
 @atexit.register
