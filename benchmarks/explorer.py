@@ -10,14 +10,15 @@ Each of the two has a process of its own with kernel caches of its own, which be
 Chromium with software GL. In every turn one slider is moved to the same value in both, and who begins alternates. Time
 is taken in the page, from before the ``input`` event until the pixels of all pictures are there: in both one pixel of
 each canvas is read back, so that the drawing has ended; and until the second animation frame after that, when the page
-with its pictures has been put together. Only then is it the other's turn. The first picture is timed from the start of
-the navigation, with and without kernels on disk.
+with its pictures has been put together. A pause after that it is the other's turn. The first picture is timed from the
+start of the navigation, with and without kernels on disk.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import math
 import os
 import socket
 import statistics
@@ -36,12 +37,16 @@ from playwright.sync_api import Browser, Page, sync_playwright
 from rich.console import Console
 from rich.table import Table
 
+from pbrdf import DoubleGauss
+
 SOURCE = Path(__file__).resolve().parent.parent / "src"
 #: WebGL2 without a graphics card.
 FLAGS = ("--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 #: Where the sliders are moved to: name, least and largest value.
 SLIDERS = {"sigma": (0.02, 0.1), "n": (1.4, 1.9), "t": (0.3, 0.9)}
 TARGET_RATIO, TARGET_FIRST = 0.5, 2.0
+#: Seconds between the two's turns: what one has left the browser to do is done before the other is timed.
+PAUSE = 0.4
 #: Serves the explorer with the paint that the prototype shows, and prints the address.
 SERVE = """
 import asyncio
@@ -86,9 +91,10 @@ addEventListener("pbrdf-drawn", () => {
 });
 """
 MOVE = """
-([selector, value]) => new Promise(answer => {
+([selector, value, share]) => new Promise(answer => {
   const slider = document.querySelector(selector), before = received();
-  slider.value = value;
+  // the explorer's sliders count steps along a scale of their own
+  slider.value = share === null ? value : Number(slider.max) * share;
   const start = performance.now();
   window.told = now => {
     window.told = null;
@@ -98,6 +104,14 @@ MOVE = """
   slider.dispatchEvent(new Event("input", { bubbles: true }));
 })
 """
+
+
+def along(name: str, value: float) -> float:
+    """Where a value stands on the explorer's slider, from 0 to 1."""
+    p = next(p for p in DoubleGauss.parameters if p.name == name)
+    if p.logarithmic:
+        return math.log(value / p.lower) / math.log(p.upper / p.lower)
+    return (value - p.lower) / (p.upper - p.lower)
 
 
 class Subject:
@@ -126,7 +140,8 @@ class Subject:
 
     def move(self, slider: str, value: float, counted: bool) -> None:
         """Move a slider and wait for the pixels."""
-        milliseconds, size, frame = self.page.evaluate(MOVE, [self.selector.format(slider), value])
+        share = along(slider, value) if self.narrow else None
+        milliseconds, size, frame = self.page.evaluate(MOVE, [self.selector.format(slider), value, share])
         if counted:
             self.times.append(milliseconds)
             self.bytes.append(size)
@@ -168,6 +183,11 @@ def measure(options: argparse.Namespace) -> list[Subject]:
     with sync_playwright() as playwright, tempfile.TemporaryDirectory() as scratch:
         browser = playwright.chromium.launch(executable_path=options.chromium, args=list(FLAGS))
 
+        # whoever comes first should not pay for the start of the browser and its graphics
+        blank = browser.new_page()
+        blank.evaluate("document.createElement('canvas').getContext('webgl2').finish()")
+        blank.close()
+
         def start(subject: Subject) -> Any:
             cache = Path(scratch) / subject.name
             cache.mkdir(exist_ok=True)
@@ -191,6 +211,7 @@ def measure(options: argparse.Namespace) -> list[Subject]:
                 value = round(low + (high - low) * rng.random(), 3)
                 for subject in subjects[:: 1 if turn % 2 else -1]:
                     subject.move(name, value, turn >= 3)
+                    time.sleep(PAUSE)
         browser.close()
     return subjects
 

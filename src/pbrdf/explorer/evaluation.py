@@ -292,6 +292,8 @@ def described(picture: Picture, difference: bool) -> dict[str, Any]:
 
 
 _compiled: set[Any] = set()
+#: Seconds after a picture at rest until what a drag needs is compiled.
+_LATER = 0.3
 
 
 def _kernel(state: State, quantities: Sequence[str], dragging: bool) -> Any:
@@ -332,6 +334,8 @@ def prepare(state: State, quantities: Sequence[str], work: Callable[[], Any]) ->
     if wanted in _compiled:
         return None
     _compiled.add(wanted)
-    thread = threading.Thread(target=work, name="pbrdf compiles")
+    # not before the picture at rest is on the screen
+    thread = threading.Timer(_LATER, work)
+    thread.name = "pbrdf compiles"
     thread.start()
     return thread

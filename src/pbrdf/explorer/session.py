@@ -20,7 +20,7 @@ from pbrdf.explorer.state import StateError, read_state
 from pbrdf.explorer.uploads import MOST_BYTES
 from pbrdf.explorer.workspace import Workspace
 
-__all__ = ["REQUESTS", "VIEWS", "Emit", "Session", "prepared"]
+__all__ = ["REQUESTS", "VIEWS", "Emit", "Session", "get_ready", "prepared"]
 
 #: Sends a JSON object and buffers to the page, from any thread.
 Emit = Callable[[Mapping[str, Any], Sequence[bytes | memoryview]], None]
@@ -56,6 +56,16 @@ def prepared() -> dict[str, Any]:
     """The catalogue, put together once: whoever asks meanwhile waits for it."""
     with _preparing:
         return catalogue()
+
+
+def get_ready() -> None:
+    """Load what the first page asks for before it shows pictures; pages wait for it, as two threads that load libraries
+    at once may find them half loaded.
+    """
+    with _preparing:
+        catalogue()
+        for module in (*VIEWS.values(), REQUESTS["data"]):
+            import_module(module)
 
 
 class Session:
