@@ -234,3 +234,5 @@ def test_a_process_that_ended_is_said_to_have_and_replaced(experiment, white):
     workspace.close()
     process_of(workspace).warm()
     assert process_of(workspace).pid is None  # a closed page starts nothing
+    with pytest.raises(FitError, match="no process can be started"):
+        process_of(workspace).start(job, heard.append)

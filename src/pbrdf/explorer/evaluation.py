@@ -312,7 +312,7 @@ def _kernel(state: State, quantities: Sequence[str], dragging: bool) -> Any:
     return tuple(kinds), state.part, tuple(quantities), any(s[1:]), any(s[2:])
 
 
-def prepare(state: State, quantities: Sequence[str], work: Callable[[], Any]) -> threading.Thread | None:
+def prepare(state: State, quantities: Sequence[str], work: Callable[[], Any]) -> threading.Timer | None:
     """Compile in a thread what the first drag of a slider needs.
 
     Parameters
@@ -326,8 +326,8 @@ def prepare(state: State, quantities: Sequence[str], work: Callable[[], Any]) ->
 
     Returns
     -------
-    threading.Thread
-        At work; None where it is compiled already.
+    threading.Timer
+        At work in a moment; None where it is compiled already.
     """
     _compiled.add(_kernel(state, quantities, False))
     wanted = _kernel(state, quantities, True)

@@ -29,7 +29,7 @@ import tornado.websocket
 from pbrdf.errors import DataError, PbrdfError
 from pbrdf.explorer.messages import pack, unpack
 from pbrdf.explorer.module import PAGE, module_text
-from pbrdf.explorer.session import Session, get_ready
+from pbrdf.explorer.session import Session, prepared
 from pbrdf.explorer.workspace import Workspace
 
 __all__ = ["serve"]
@@ -205,8 +205,8 @@ async def serve(workspace: Callable[[], Workspace], port: int, ready: Callable[[
         application, max_body_size=1 << 16, max_header_size=1 << 16, idle_connection_timeout=60.0
     )
     server.add_socket(listening)
-    # while the browser opens
-    threading.Thread(target=get_ready, name="pbrdf gets ready").start()
+    # what the first page asks for is put together while the browser opens
+    threading.Thread(target=prepared, name="pbrdf catalogue").start()
     try:
         ready(f"http://127.0.0.1:{bound}/?token={guard.token}")
         await asyncio.Event().wait()

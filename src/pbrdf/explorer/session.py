@@ -6,9 +6,11 @@ Several pages have a thread each; Dr.Jit evaluates in several threads at once.
 
 from __future__ import annotations
 
+import atexit
 import logging
 import queue
 import threading
+import weakref
 from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 from typing import Any
@@ -20,7 +22,7 @@ from pbrdf.explorer.state import StateError, read_state
 from pbrdf.explorer.uploads import MOST_BYTES
 from pbrdf.explorer.workspace import Workspace
 
-__all__ = ["REQUESTS", "VIEWS", "Emit", "Session", "get_ready", "prepared"]
+__all__ = ["REQUESTS", "VIEWS", "Emit", "Session", "prepared"]
 
 #: Sends a JSON object and buffers to the page, from any thread.
 Emit = Callable[[Mapping[str, Any], Sequence[bytes | memoryview]], None]
@@ -48,6 +50,9 @@ _MOST_WAITING = 64
 #: What a page is told of a fault that is not its own.
 _FAULT = "an error of the explorer; the terminal says more"
 
+#: Seconds that the end of Python waits for a session's thread: one that it ends amid Dr.Jit takes the process down.
+_TO_END = 2.0
+_at_work: weakref.WeakSet[Session] = weakref.WeakSet()
 _preparing = threading.Lock()
 _log = logging.getLogger(__name__)
 
@@ -58,14 +63,11 @@ def prepared() -> dict[str, Any]:
         return catalogue()
 
 
-def get_ready() -> None:
-    """Load what the first page asks for before it shows pictures; pages wait for it, as two threads that load libraries
-    at once may find them half loaded.
-    """
-    with _preparing:
-        catalogue()
-        for module in (*VIEWS.values(), REQUESTS["data"]):
-            import_module(module)
+@atexit.register
+def _close_all() -> None:
+    for session in list(_at_work):
+        session.close()
+        session._thread.join(_TO_END)
 
 
 class Session:
@@ -90,6 +92,7 @@ class Session:
         self._newest_draw = 0
         self._thread = threading.Thread(target=self._work, daemon=True, name="pbrdf explorer")
         self._thread.start()
+        _at_work.add(self)
 
     def emit(self, content: Mapping[str, Any], buffers: Sequence[bytes | memoryview]) -> None:
         """Send an answer, from any thread; nothing where the page has gone."""

@@ -106,8 +106,16 @@ def test_sliders_numbers_undo_and_address(opened):
     page.wait_for_function(
         "() => document.querySelector('[name=theta_i]').getAttribute('aria-valuetext') === '60 °'"
     )
+    assert state_of_page(page)["light"]["theta_i"] == 60.0
     page.evaluate("() => { location.hash = 'state=nonsense'; }")
     page.get_by_text("the address holds no state").wait_for()
+    # one that cannot be shown leaves what the program was given
+    page.evaluate("s => { location.hash = 'state=' + btoa(JSON.stringify({ ...s, version: 9 })); }", state)
+    page.get_by_text("the address: this state is of another version").wait_for()
+    page.reload()
+    page.get_by_text("the address: this state is of another version").wait_for()
+    page.wait_for_selector(".card canvas")
+    assert page.get_by_label("σ, number").input_value() == "0.0398"
 
 
 def test_models_light_and_quantities(opened):
