@@ -336,5 +336,6 @@ def prepare(state: State, quantities: Sequence[str], work: Callable[[], Any]) ->
     _compiled.add(wanted)
     # not before the picture at rest is on the screen
     thread = threading.Timer(_LATER, work)
+    thread.name = "pbrdf compiles"
     thread.start()
     return thread
