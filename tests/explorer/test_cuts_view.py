@@ -139,6 +139,17 @@ def test_points_in_an_azimuth_at_the_angle_of_the_light(white):
     workspace.close()
 
 
+def test_of_very_many_points_some_are_drawn(white):
+    theta_r = np.deg2rad(np.linspace(0.0, 80.0, 5000))
+    ds = make_dataset(0.5, theta_r, 0.0, quantity="brdf", I=np.full(5000, 0.3))
+    workspace = Workspace(datasets=[("scan", ds)])
+    drawn = Drawn(content_of(white), workspace)
+    workspace.close()
+    assert len(drawn.at) == 500 and len(drawn.x) < 1000
+    assert "500 of the 5000 points" in drawn.header["note"]
+    np.testing.assert_array_equal(drawn.points[0, 0], 0.3)
+
+
 def test_angles_are_drawn_within_the_half_turn_that_they_leave_least():
     steady = np.array([0.0, 90.0, 80.0, np.nan, -10.0])
     assert half_turn_of(steady) == -45.0

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import pbrdf
+from pbrdf.data import make_dataset
 from pbrdf.explorer.workspace import Workspace
 
 pytestmark = pytest.mark.slow
@@ -104,7 +105,7 @@ def test_points_are_switched_off_by_keyboard_and_a_fit_can_be_undone(served, pag
     table = page.locator(".fitting .estimates").inner_text().replace("−", "-")
     estimate = result.estimates["sigma"]
     assert f"{estimate.value:.4f}"[:5] in table and "±" in table
-    assert page.locator(".fitting .correlation td").count() == result.correlation.size
+    assert page.locator(".fitting .correlation tbody td").count() == result.correlation.size
     text = page.locator(".fitting").inner_text()
     assert result.verdict().sentence in text
     assert "held out: group=3 (21 geometries)" in text
@@ -117,3 +118,33 @@ def test_points_are_switched_off_by_keyboard_and_a_fit_can_be_undone(served, pag
     page.get_by_role("button", name="Take the fitted values over again").click()
     stands = slider.evaluate("node => node.getAttribute('aria-valuetext') ?? node.value")
     assert numbers(stands)[0] == pytest.approx(estimate.value, rel=0.01)
+
+
+def test_light_follows_the_chosen_line_and_settings_of_other_data_are_given_up(served, page, white):
+    theta_i = np.deg2rad(np.repeat([30.0, 60.0], 9))
+    s = np.deg2rad(np.tile(np.linspace(-40.0, 40.0, 9), 2))
+    phi = np.where(s < 0.0, np.pi, 0.0)
+    S = white.stokes(theta_i, np.abs(s), phi)
+    ds = make_dataset(theta_i, np.abs(s), phi, quantity="brdf", I=S[:, 0], Q=S[:, 1], U=S[:, 2])
+    workspace = Workspace([("white", white)], [("scan", ds)])
+    state = workspace.state()
+    state["settings"] = {"data": {"set": "gone", "off": [400]}}
+    workspace.state = lambda: state
+    opened(served, page, lambda: workspace)
+    expect(page.locator(".curves")).to_contain_text("no data called 'gone' are open here", timeout=PATIENCE)
+    page.get_by_role("button", name="Show what is open").click()
+    line = page.get_by_label("Along", exact=True)
+    expect(line.locator("option")).to_have_count(4, timeout=PATIENCE)
+    page.get_by_label("light follows").check()
+    line.select_option(label="θi = 60°")
+    expect(page.get_by_label("θᵢ, number")).to_have_value("60", timeout=PATIENCE)
+    # nine points in each of two plots, twice each, and one that explains them
+    expect(page.locator(".curves .mark-used")).to_have_count(37, timeout=PATIENCE)
+    page.get_by_label("60°", exact=True).check()
+    expect(page.locator(".curves .mark-held")).to_have_count(37, timeout=PATIENCE)
+    # the table says and does the same
+    page.locator(".curves summary").click()
+    box = page.get_by_label("use the point at −40°")
+    box.uncheck()
+    expect(page.locator(".curves .mark-off").first).to_be_visible(timeout=PATIENCE)
+    expect(page.get_by_role("button", name="Switch 1 point on again")).to_be_enabled()

@@ -12,6 +12,7 @@ from pbrdf.cli.main import app
 from pbrdf.errors import PbrdfError
 from pbrdf.explorer import exports
 from pbrdf.explorer.catalogue import layer_of, state_of
+from pbrdf.explorer.workspace import Workspace
 from pbrdf.models.registry import find_model
 
 GGX = find_model("ggx-lambert").from_values(
@@ -29,8 +30,8 @@ def state(white):
     return {**state_of(shown), "light": {"theta_i": 42.5, "stokes": [1.0, 0.3, 0.4, 0.0]}}
 
 
-def made(state, what, kind="png"):
-    return exports.export({"state": state, "what": what, "format": kind})
+def made(state, what, kind="png", workspace=None):
+    return exports.export({"state": state, "what": what, "format": kind}, workspace or Workspace())
 
 
 def save_models(state, folder):
@@ -93,6 +94,53 @@ def test_the_command_draws_the_same_figure(state, tmp_path, run, what, kind):
     assert (tmp_path / found.name).read_bytes() == found.content
 
 
+@pytest.fixture
+def measured(tmp_path):
+    """A workspace with data whose file is beside the models'."""
+    dataset = pbrdf.open_experiment("matte-white-thick")
+    pbrdf.write(dataset, tmp_path / "paint.csv")
+    return Workspace(datasets=[("paint.csv", pbrdf.read(tmp_path / "paint.csv"))])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("what", "kind"), [("curves", "svg"), ("hemisphere", "png"), ("mueller", "svg")])
+def test_measured_data_are_in_the_figures(state, measured, tmp_path, run, what, kind):
+    save_models(state, tmp_path)
+    found = made(state, what, kind, measured)
+    assert "paint.csv" in found.command
+    assert ("in the light of the data" in found.note) == (what != "mueller")
+    run(found.command)
+    assert (tmp_path / found.name).read_bytes() == found.content
+
+
+@pytest.mark.slow
+def test_the_command_of_a_fit_fits_as_the_page_does(state, measured, tmp_path, run):
+    state["settings"] = {
+        "fit": {"starts": 2, "held": ["n", "t"], "free": ["kappa"]},
+        "data": {"held_out": {"kind": "group", "values": ["3"]}, "off": [4]},
+    }
+    save_models(state, tmp_path)
+    found = made(state, "fit", "", measured)
+    assert found.content is None
+    assert "switched off" in found.note
+    n, t = (state["layers"][0]["parameters"][name] for name in ("n", "t"))
+    words = [
+        "paint.csv",
+        "--model",
+        "matte-white-thick.json",
+        "--starts",
+        "2",
+        "--fix",
+        f"n={n}",
+        "--fix",
+        f"t={t}",
+    ]
+    assert shlex.split(found.command)[2:] == [*words, "--free", "kappa", "--hold-out", "group=3"]
+    run(f"{found.command} --no-figures --no-suggestions -o out")
+    fitted = pbrdf.load_fit(tmp_path / "out")
+    assert fitted.model.values["n"] == n
+
+
 def test_commands_name_paints_as_they_are_and_others_by_their_files(state):
     state["layers"].append(
         {**state["layers"][0], "parameters": {**state["layers"][0]["parameters"], "n": 1.5}}
@@ -104,6 +152,7 @@ def test_commands_name_paints_as_they_are_and_others_by_their_files(state):
 def test_what_is_left_out_is_said(state):
     assert "natural light" in made(state, "overview", "svg").note
     assert "not a part" in made({**state, "part": "specular"}, "curves", "svg").note
+    assert "not their difference" in made({**state, "compare": 1}, "curves", "svg").note
     assert made(state, "curves", "svg").note == ""
 
 
@@ -119,16 +168,16 @@ def test_what_is_left_out_is_said(state):
 def test_what_cannot_be_made_is_refused(state, request_):
     state["light"]["theta_i"] = request_.get("theta_i", 30)
     with pytest.raises(PbrdfError):
-        exports.export({"state": state, **request_})
+        exports.export({"state": state, **request_}, Workspace())
 
 
 def test_answers_come_as_messages(state):
     emitted = []
     for what in ("model", "none"):
         request = {"id": 3, "what": what, "state": state}
-        exports.answer(request, [], None, lambda content, buffers: emitted.append((content, buffers))).join(
-            60
-        )
+        exports.answer(
+            request, [], Workspace(), lambda content, buffers: emitted.append((content, buffers))
+        ).join(60)
     (content, [file]), (error, none) = emitted
     assert content["type"] == "exported" and content["name"] == "matte-white-thick.json"
     assert json.loads(file)["model"] == "double-gauss"

@@ -144,7 +144,11 @@ def test_a_model_does_not_differ_from_itself(white):
 
 def test_a_move_compiles_nothing(white):
     quantities = ("intensity", "dolp")
-    thread = prepare(state(white), quantities, GRID)
+
+    def work():
+        fields(state(white), quantities, GRID, True)
+
+    thread = prepare(state(white), quantities, work)
     if thread is not None:
         thread.join()
     fields(state(white), quantities, GRID, False)
@@ -155,7 +159,7 @@ def test_a_move_compiles_nothing(white):
         kernels = [k for k in dr.kernel_history() if k["type"] == dr.KernelType.JIT]
     assert len(kernels) == 6  # the model, then the quantities
     assert all(k["cache_hit"] for k in kernels)
-    assert prepare(state(white), quantities, GRID) is None
+    assert prepare(state(white), quantities, work) is None
 
 
 def test_what_the_page_is_told(white):

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import pbrdf
+from pbrdf.errors import FitError
 from pbrdf.explorer.catalogue import layer_of, state_of
 from pbrdf.explorer.fit_process import process_of
 from pbrdf.explorer.fit_worker import found_by
@@ -196,6 +197,28 @@ def test_no_process_outlives_its_server():
     assert gone(worker)
 
 
+@pytest.mark.slow
+def test_a_model_that_no_other_process_knows_is_said_to_be_one(experiment, white, monkeypatch):
+    workspace, heard, end = Workspace(datasets=[("white", experiment)]), [], threading.Event()
+    job = job_of(read_state(content_of(white)), workspace)
+
+    class Local(type(white)):
+        name = "local"
+
+    own = Local(**white.values)
+    process = process_of(workspace)
+    with pytest.raises(FitError, match="cannot be fitted by a process beside"):
+        process.start({**job, "model": own}, heard.append)
+    assert not process.busy
+    # as in a notebook, where the class stands in __main__
+    Local.__module__, Local.__qualname__ = "__main__", "Local"
+    monkeypatch.setattr(sys.modules["__main__"], "Local", Local, raising=False)
+    process.start({**job, "model": own}, lambda message: (heard.append(message), end.set()))
+    assert end.wait(60)
+    assert "in a module that can be imported" in heard[-1]["text"]
+    workspace.close()
+
+
 def test_a_process_that_ended_is_said_to_have_and_replaced(experiment, white):
     workspace = Workspace(datasets=[("white", experiment)])
     process_of(workspace).warm()
@@ -211,3 +234,5 @@ def test_a_process_that_ended_is_said_to_have_and_replaced(experiment, white):
     workspace.close()
     process_of(workspace).warm()
     assert process_of(workspace).pid is None  # a closed page starts nothing
+    with pytest.raises(FitError, match="no process can be started"):
+        process_of(workspace).start(job, heard.append)

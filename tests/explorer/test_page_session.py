@@ -1,5 +1,8 @@
 """One page at work: what is answered, what is not any more, and what a page that is none may send."""
 
+import os
+import subprocess
+import sys
 import threading
 
 import numpy as np
@@ -188,3 +191,22 @@ def test_pages_draw_at_once(white):
     first = pictures[0][0]
     assert np.isfinite(first).all()
     assert all(np.array_equal(picture, first) for drawn in pictures.values() for picture in drawn)
+
+
+@pytest.mark.slow
+def test_python_ends_though_pages_are_open():
+    """As a notebook's kernel does, whose widgets nobody has closed."""
+    code = (
+        "import pbrdf\n"
+        "from pbrdf.explorer.session import Session\n"
+        "from pbrdf.explorer.workspace import Workspace\n"
+        "workspace = Workspace([('white', pbrdf.load_paint('white'))])\n"
+        "session = Session(workspace, lambda content, buffers: None)\n"
+        "session.receive({'type': 'draw', 'views': ['hemisphere'], 'state': workspace.state()})\n"
+        "session.wait()"
+    )
+    path = {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    done = subprocess.run(
+        [sys.executable, "-c", code], env={**os.environ, **path}, capture_output=True, text=True, timeout=120
+    )
+    assert (done.returncode, done.stderr) == (0, "")

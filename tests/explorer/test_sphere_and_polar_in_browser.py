@@ -15,12 +15,15 @@ pytestmark = pytest.mark.slow
 BALL, POLAR = "article[aria-label='Lit ball'] canvas", "article[aria-label='Polar surface'] canvas"
 #: Colours of places of a canvas, from its middle in half widths, x to the right and y up; in bytes.
 READ = """([selector, places]) => {
-    const canvas = document.querySelector(selector), gl = canvas.getContext("webgl2");
-    const pixels = new Uint8Array(4 * canvas.width * canvas.height);
-    gl.readPixels(0, 0, canvas.width, canvas.height, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+    const canvas = document.querySelector(selector), copy = document.createElement("canvas");
+    const pen = copy.getContext("2d");
+    copy.width = canvas.width;
+    copy.height = canvas.height;
+    pen.drawImage(canvas, 0, 0);
+    const pixels = pen.getImageData(0, 0, canvas.width, canvas.height).data;
     return places.map(([x, y]) => {
         const column = Math.round((x + 1) * canvas.width / 2 - 0.5);
-        const row = Math.round((y + 1) * canvas.height / 2 - 0.5);
+        const row = Math.round((1 - y) * canvas.height / 2 - 0.5);
         const at = 4 * (row * canvas.width + column);
         return [...pixels.subarray(at, at + 4)];
     });

@@ -1,5 +1,8 @@
 """The lit ball: radiances and frames of the picture against the Mueller matrix and vectors worked out here."""
 
+import threading
+
+import drjit as dr
 import numpy as np
 import pytest
 
@@ -118,6 +121,27 @@ def test_buffers(paint):
     largest = np.abs(first - second)[..., 0].max()
     assert largest <= header["ranges"]["radiance"] < 3.0 * largest
     np.testing.assert_allclose(first[:, 0], first[:, -1], rtol=1e-3, atol=1e-6)
+
+
+@pytest.mark.slow
+def test_a_move_compiles_nothing(paint):
+    def drawn(dragging, **changes):
+        lamp = {"light": {"polar": changes.pop("polar", 40.0), "azimuth": 10.0}}
+        return sphere.draw(
+            State((Layer("a", paint.replace(**changes)),), settings={"sphere": lamp}), Workspace(), dragging
+        )
+
+    drawn(False)
+    for thread in threading.enumerate():
+        if thread.name == "pbrdf compiles":
+            thread.join()
+    dr.kernel_history_clear()
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+        for sigma, polar in ((0.1, 20.0), (0.3, 100.0)):
+            drawn(True, sigma=sigma, polar=polar)
+        kernels = [k for k in dr.kernel_history() if k["type"] == dr.KernelType.JIT]
+    assert len(kernels) == 2
+    assert all(k["cache_hit"] for k in kernels)
 
 
 @pytest.mark.parametrize(

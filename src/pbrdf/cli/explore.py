@@ -20,7 +20,7 @@ def explore(
     sources: Annotated[
         list[str] | None,
         typer.Argument(
-            metavar="[MODEL|DATA|FIT|MAP]…",
+            metavar="MODEL|DATA|FIT|MAP",
             help="Models' JSON files, bundled paints' names (their models), files of data, folders of fits, maps of "
             "parameters; none to choose on the page.",
             show_default=False,

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -312,14 +312,29 @@ def _kernel(state: State, quantities: Sequence[str], dragging: bool) -> Any:
     return tuple(kinds), state.part, tuple(quantities), any(s[1:]), any(s[2:])
 
 
-def prepare(state: State, quantities: Sequence[str], grid: Grid) -> threading.Thread | None:
-    """Compile in a thread what the first drag of a slider needs; the thread, None where it is compiled already."""
+def prepare(state: State, quantities: Sequence[str], work: Callable[[], Any]) -> threading.Timer | None:
+    """Compile in a thread what the first drag of a slider needs.
+
+    Parameters
+    ----------
+    state
+        What has been drawn at rest.
+    quantities
+        What was drawn of it; other views name their own.
+    work
+        Draws the same as while a slider is dragged.
+
+    Returns
+    -------
+    threading.Timer
+        At work in a moment; None where it is compiled already.
+    """
     _compiled.add(_kernel(state, quantities, False))
     wanted = _kernel(state, quantities, True)
     if wanted in _compiled:
         return None
     _compiled.add(wanted)
     # not before the picture at rest is on the screen
-    thread = threading.Timer(_LATER, fields, (state, quantities, grid, True))
+    thread = threading.Timer(_LATER, work)
     thread.start()
     return thread

@@ -2,8 +2,9 @@
 
 Requests are ``{type: "export", what, format, state}``; the answer ``{type: "exported", name, media, command, note}``
 has the file as its one buffer. Nothing is written on this machine: the browser keeps the file where its reader wants
-it. Figures are those of ``pbrdf plot`` and tables those of ``pbrdf simulate``; the commands name the models' files as
-the page saves them.
+it. Figures are those of ``pbrdf plot``, with the measured data that are chosen, and tables those of ``pbrdf
+simulate``; ``fit`` has no file but the ``pbrdf fit`` that begins where the sliders stand. The commands name the
+models' files as the page saves them, and data by their names.
 """
 
 from __future__ import annotations
@@ -23,6 +24,8 @@ from pbrdf.data.formats.csv_table.writing import csv_text
 from pbrdf.data.paints import PAINTS, WAVELENGTH, load_paint
 from pbrdf.data.schema import NATURAL_LIGHT
 from pbrdf.errors import PbrdfError
+from pbrdf.explorer.fitting import job_of
+from pbrdf.explorer.points import Choice, chosen_data
 from pbrdf.explorer.session import Emit
 from pbrdf.explorer.state import Layer, State, StateError, read_state
 from pbrdf.explorer.workspace import Workspace
@@ -63,7 +66,7 @@ class Export:
     media
         Its media type.
     content
-        Its bytes.
+        Its bytes; None for a command alone.
     command
         Command line that makes the same of the models' files; None where there is none.
     note
@@ -72,7 +75,7 @@ class Export:
 
     name: str
     media: str
-    content: bytes
+    content: bytes | None
     command: str | None = None
     note: str = ""
 
@@ -85,7 +88,7 @@ def answer(
     def work() -> None:
         head = {"id": request.get("id")}
         try:
-            made = export(request)
+            made = export(request, workspace)
         except PbrdfError as error:
             place = error.place if isinstance(error, StateError) else ""
             emit({"type": "error", "about": "export", "place": place, "text": str(error), **head}, [])
@@ -95,14 +98,14 @@ def answer(
             emit({"type": "error", "about": "export", "place": "", "text": text, **head}, [])
         else:
             about = {"name": made.name, "media": made.media, "command": made.command, "note": made.note}
-            emit({"type": "exported", **about, **head}, [made.content])
+            emit({"type": "exported", **about, **head}, [] if made.content is None else [made.content])
 
     thread = threading.Thread(target=work, daemon=True, name="pbrdf export")
     thread.start()
     return thread
 
 
-def export(request: Mapping[str, Any]) -> Export:
+def export(request: Mapping[str, Any], workspace: Workspace) -> Export:
     """Make the file that a request asks for.
 
     Raises
@@ -119,11 +122,13 @@ def export(request: Mapping[str, Any]) -> Export:
     if what in TABLES:
         return _table(state, what)
     if what in FIGURES:
-        return _figure(state, what, kind)
+        return _figure(state, workspace, what, kind)
+    if what == "fit":
+        return _fit(state, workspace)
     raise PbrdfError(f"there is no export {what[:40]!r}")
 
 
-def _figure(state: State, what: str, kind: str) -> Export:
+def _figure(state: State, workspace: Workspace, what: str, kind: str) -> Export:
     from pbrdf.report.model.figure import model_figure
     from pbrdf.report.style import FIGURE_FORMATS, figure_bytes
     from pbrdf.report.together.curves import curves_figure, mueller_figure
@@ -132,20 +137,36 @@ def _figure(state: State, what: str, kind: str) -> Export:
 
     if kind not in FIGURE_FORMATS:
         raise PbrdfError(f"figures are made as {', '.join(FIGURE_FORMATS)}")
-    theta_i, light = _angle(state), state.light.stokes
+    theta_i: float | None = _angle(state)
+    light = state.light.stokes
     alone = what == "overview"
+    choice = None if alone else chosen_data(state, workspace)
     layers = [state.shown] if alone else [layer for layer in state.layers if layer.shown] or [state.shown]
     sources = _sources(layers)
     notes = []
     if state.part != "total":
         notes.append("it shows all light of the models, not a part")
+    if state.compare is not None:
+        notes.append("it shows the models, not their difference")
     if alone and light != NATURAL_LIGHT:
         notes.append("it is drawn in natural light")
     incident = None if what in ("overview", "mueller") or light == NATURAL_LIGHT else light
+    drawn = [Source(source, model=layer.model) for source, layer in zip(sources, layers, strict=True)]
+    if choice is not None:
+        measured = Source(choice.measured.name, dataset=choice.measured.dataset)
+        if what == "mueller" and not any(measured.channel(f"m{i}{j}") for i in range(4) for j in range(4)):
+            choice = None
+        else:
+            drawn.append(measured)
+            sources.append(measured.name)
+            if what != "mueller" and not np.allclose(choice.measured.light, light):
+                notes.append("it is drawn in the light of the data")
+            notes += _switched_off(choice)
+            # the data's own lines and light
+            incident, theta_i = None, theta_i if what in ("hemisphere", "surface") else None
     with _drawing:
-        drawn = [Source(source, model=layer.model) for source, layer in zip(sources, layers, strict=True)]
         if alone:
-            figure = model_figure(layers[0].model, theta_i, sources[0])
+            figure = model_figure(layers[0].model, state.light.theta_i, sources[0])
         elif what == "mueller":
             figure = mueller_figure(drawn, theta_i)
         else:
@@ -160,8 +181,35 @@ def _figure(state: State, what: str, kind: str) -> Export:
     words = ["pbrdf", "plot", *sources]
     if FIGURES[what] is not None:
         words += ["--kind", str(FIGURES[what])]
-    words += ["--theta-i", f"{theta_i:.10g}", *_incident(incident), "--output", name]
+    if theta_i is not None:
+        words += ["--theta-i", f"{theta_i:.10g}"]
+    words += [*_incident(incident), *_selected(choice), "--output", name]
     return Export(name, _MEDIA[kind], content, shlex.join(words), "; ".join(notes))
+
+
+def _fit(state: State, workspace: Workspace) -> Export:
+    """The command that fits what the page fits, from where the sliders stand."""
+    job, choice = job_of(state, workspace), chosen_data(state, workspace)
+    assert choice is not None
+    [file] = _file_names([state.shown])
+    words = ["pbrdf", "fit", choice.measured.name, "--model", file, "--starts", str(job["starts"])]
+    for name, value in job["fix"].items():
+        words += ["--fix", f"{name}={float(value)!r}"]
+    for name in job["free"]:
+        words += ["--free", name]
+    if job["hold_out"] is not None:
+        words += ["--hold-out", f"{job['hold_out'].kind}={','.join(job['hold_out'].values)}"]
+    notes = [*_switched_off(choice), f"save the model file, {file}, beside the data"]
+    return Export("", "", None, shlex.join([*words, *_selected(choice)]), "; ".join(notes))
+
+
+def _selected(choice: Choice | None) -> list[str]:
+    wavelength = None if choice is None else choice.measured.wavelength
+    return [] if wavelength is None else ["--select", f"wavelength={wavelength:.10g}"]
+
+
+def _switched_off(choice: Choice) -> list[str]:
+    return ["points that are switched off are in it"] if choice.off.any() else []
 
 
 def _table(state: State, what: str) -> Export:
@@ -230,7 +278,7 @@ def _slug(name: str) -> str:
 
 
 def _incident(light: Sequence[float] | None) -> list[str]:
-    return [] if light is None else ["--incident", ",".join(f"{s:.17g}" for s in light)]
+    return [] if light is None else ["--incident", ",".join(repr(float(s)) for s in light)]
 
 
 def _steps(ends: tuple[float, float, float]) -> np.ndarray:

@@ -66,14 +66,16 @@ class FitProcess:
         with self._lock:
             if self._child is not None and self._child.poll() is not None:
                 self._end()
-            if self._child is None and not self._closed:
-                self._child = subprocess.Popen(
-                    [sys.executable, "-P", "-m", _PROGRAM],
-                    stdin=subprocess.PIPE,
-                    stdout=subprocess.PIPE,
-                    env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
-                    creationflags=_LOW,
-                )
+            if self._child is None and not self._closed and sys.executable:
+                environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+                with suppress(OSError):
+                    self._child = subprocess.Popen(
+                        [sys.executable, "-P", "-m", _PROGRAM],
+                        stdin=subprocess.PIPE,
+                        stdout=subprocess.PIPE,
+                        env=environment,
+                        creationflags=_LOW,
+                    )
 
     def start(self, job: dict[str, Any], tell: Tell) -> None:
         """Begin a fit.
@@ -89,16 +91,20 @@ class FitProcess:
         Raises
         ------
         FitError
-            If another fit is running.
+            If another fit is running, there can be no process, or none that can be told of the model.
         """
+        try:
+            content = pickle.dumps(job)
+        except (pickle.PicklingError, AttributeError, TypeError) as error:
+            raise FitError(f"this model cannot be fitted by a process beside: {error}") from None
         with self._lock:
             if self._job is not None:
                 raise FitError("a fit is running: wait for it, or cancel it")
             self.warm()
             if self._child is None:
-                raise FitError("the page is closed")
+                raise FitError("no process can be started that fits")
             self._job = _Job(self._child, tell)
-            threading.Thread(target=self._follow, args=(self._job, job), daemon=True).start()
+            threading.Thread(target=self._follow, args=(self._job, content), daemon=True).start()
 
     def cancel(self) -> bool:
         """End the fit that is running at once; False if there is none."""
@@ -128,7 +134,7 @@ class FitProcess:
                 with suppress(OSError):
                     pipe.close()
 
-    def _follow(self, job: _Job, content: dict[str, Any]) -> None:
+    def _follow(self, job: _Job, content: bytes) -> None:
         """Hand the job over and tell what comes of it."""
         message: dict[str, Any] | None = None
         assert job.child.stdin is not None and job.child.stdout is not None

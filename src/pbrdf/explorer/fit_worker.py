@@ -24,6 +24,7 @@ __all__ = ["found_by", "main"]
 
 #: Steps of politeness: the sliders go first.
 _NICE = 10
+_OWN = "define a model of your own in a module that can be imported"
 
 
 def found_by(job: dict[str, Any], tell: Callable[[dict[str, Any]], None]) -> dict[str, Any]:
@@ -132,19 +133,29 @@ def main() -> None:
     # what libraries print goes to the terminal, not among the answers
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
-    jobs: queue.Queue[dict[str, Any]] = queue.Queue()
-    threading.Thread(target=_listen, args=(jobs,), daemon=True).start()
 
     def tell(message: dict[str, Any]) -> None:
         pickle.dump(message, answers)
         answers.flush()
+
+    jobs: queue.Queue[bytes] = queue.Queue()
+    threading.Thread(target=_listen, args=(jobs,), daemon=True).start()
+    import xarray  # noqa: F401
 
     import pbrdf.inversion.fit
     import pbrdf.report.numbers  # noqa: F401
     from pbrdf.errors import PbrdfError
 
     while True:
-        job = jobs.get()
+        content = jobs.get()
+        try:
+            # here, and not where it is heard: two threads that import the same modules may wait for each other
+            job = pickle.loads(content)
+        except (AttributeError, ImportError) as error:
+            tell(
+                {"kind": "error", "text": f"the process that fits does not know this model ({error}): {_OWN}"}
+            )
+            continue
         try:
             tell(found_by(job, tell))
         except PbrdfError as error:
@@ -156,7 +167,7 @@ def main() -> None:
             tell({"kind": "error", "text": "an error of the fit; the terminal says more"})
 
 
-def _listen(jobs: queue.Queue[dict[str, Any]]) -> None:
+def _listen(jobs: queue.Queue[bytes]) -> None:
     try:
         while True:
             jobs.put(pickle.load(sys.stdin.buffer))

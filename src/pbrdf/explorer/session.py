@@ -6,9 +6,11 @@ Several pages have a thread each; Dr.Jit evaluates in several threads at once.
 
 from __future__ import annotations
 
+import atexit
 import logging
 import queue
 import threading
+import weakref
 from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 from typing import Any
@@ -48,14 +50,31 @@ _MOST_WAITING = 64
 #: What a page is told of a fault that is not its own.
 _FAULT = "an error of the explorer; the terminal says more"
 
+#: Seconds that the end of Python waits for a session's thread: one that it ends amid Dr.Jit takes the process down.
+_TO_END = 2.0
+_at_work: weakref.WeakSet[Session] = weakref.WeakSet()
+_preparing = threading.Lock()
 _log = logging.getLogger(__name__)
 
 
+def prepared() -> dict[str, Any]:
+    """The catalogue, put together once: whoever asks meanwhile waits for it."""
+    with _preparing:
+        return catalogue()
+
+
 def get_ready() -> None:
-    """Load what the first page asks for before it shows pictures."""
-    catalogue()
+    """Put together and load what the first page asks for before it shows pictures."""
+    prepared()
     for module in (*VIEWS.values(), REQUESTS["data"]):
         import_module(module)
+
+
+@atexit.register
+def _close_all() -> None:
+    for session in list(_at_work):
+        session.close()
+        session._thread.join(_TO_END)
 
 
 class Session:
@@ -80,6 +99,7 @@ class Session:
         self._newest_draw = 0
         self._thread = threading.Thread(target=self._work, daemon=True, name="pbrdf explorer")
         self._thread.start()
+        _at_work.add(self)
 
     def emit(self, content: Mapping[str, Any], buffers: Sequence[bytes | memoryview]) -> None:
         """Send an answer, from any thread; nothing where the page has gone."""
@@ -140,7 +160,7 @@ class Session:
     def _answer(self, content: dict[str, Any], buffers: Sequence[Any], turn: int) -> None:
         kind = content.get("type")
         if kind == "hello":
-            welcome = {"catalogue": catalogue(), "state": self.workspace.state(), "most_bytes": MOST_BYTES}
+            welcome = {"catalogue": prepared(), "state": self.workspace.state(), "most_bytes": MOST_BYTES}
             self.emit({"type": "welcome", **welcome}, [])
         elif kind == "draw":
             self._draw(content, turn)

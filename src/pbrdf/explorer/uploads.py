@@ -3,7 +3,8 @@
 They are opened as what the command line names, in a process of its own, :mod:`pbrdf.explorer.upload_process`, with
 limits of time and memory, while sliders go on moving. The bytes lie in a temporary folder for as long as they are read,
 under a name that cannot lead out of it. The answer is ``{type: "opened", name, layers, datasets, maps, lines}``:
-models as layers of the state, data sets and maps by name, and what is in the data in words; or an error about ``open``.
+models as layers of the state, data sets and maps by name, and what is in the data in words; or an error about ``open``,
+with ``choices`` where stating an option would mend it.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from pbrdf.data.schema import QUANTITIES
 from pbrdf.errors import DataError, PbrdfError
 from pbrdf.explorer.catalogue import layer_of
 from pbrdf.explorer.messages import error_answer
@@ -41,6 +43,15 @@ OPTIONS = frozenset(
         *("column", "unit", "ignore", "where", "skip_invalid", "sheet", "wavelength", "every"),
     }
 )
+#: Options of a table with what they can be, which the page offers where a file does not say enough of itself.
+CHOICES = {
+    "quantity": list(QUANTITIES),
+    "azimuth": ["forward=0", "forward=180"],
+    "stokes": ["p-s", "s-p"],
+    "angles": ["degrees", "radians"],
+}
+#: An error that an option would mend.
+_ASKS = re.compile(rf"\boptions? ({'|'.join(OPTIONS)})\b|\b({'|'.join(OPTIONS)})=|no usable|skip_invalid")
 #: Files that are read or wait to be read, and those that are read at once.
 _MOST_WAITING, _AT_ONCE = 8, 1
 _waiting = threading.BoundedSemaphore(_MOST_WAITING)
@@ -106,7 +117,8 @@ def _open(
         found = _opened(name, content, options, workspace)
         emit({"type": "opened", "id": error_answer(request, "")["id"], **found}, [])
     except PbrdfError as error:
-        emit(error_answer(request, str(error)), [])
+        asked = {"choices": CHOICES} if _ASKS.search(str(error)) else {}
+        emit({**error_answer(request, str(error)), **asked}, [])
     except Exception as error:
         emit(error_answer(request, f"{name}: cannot be opened: {type(error).__name__}"), [])
         raise

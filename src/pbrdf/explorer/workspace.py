@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pbrdf.data.select import measured_channels
 from pbrdf.errors import PbrdfError
 from pbrdf.explorer.catalogue import layer_of, state_of
 from pbrdf.explorer.state import MOST_LAYERS
@@ -84,6 +83,10 @@ class Workspace:
         PbrdfError
             If nothing is measured in them, or too many are open.
         """
+        from pbrdf.data.select import (
+            measured_channels,  # xarray takes as long to load as all else that a page needs
+        )
+
         if not measured_channels(dataset):
             raise PbrdfError(f"{name}: there is no measured value in it")
         if len(self.datasets) >= MOST_OPEN:

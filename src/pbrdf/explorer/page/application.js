@@ -51,8 +51,9 @@ class Application {
     this.undoable ??= before;
     this.state = next;
     if (!dragging) this.keep();
-    this.tell("state", { dragging });
+    // pictures are asked for first, and computed while the page follows
     this.draw(dragging, views);
+    this.tell("state", { dragging });
   }
 
   // Show another state altogether, a step of undo as well.

@@ -106,6 +106,19 @@ function selectField(label, groups, onchange, attributes = {}) {
   return { node: element("div", { class: "field" }, element("label", { for: id }, label), select), select };
 }
 
+// A choice that is acted on by a button: arrow keys walk through the choices of a closed select.
+function selectAndDo(label, groups, verb, act) {
+  const field = selectField(label, groups, () => { button.disabled = !field.select.value; });
+  const button = element("button", { type: "button", disabled: true, onclick: () => {
+    act(field.select.value);
+    field.select.value = "";
+    button.disabled = true;
+    // the button that has the focus is no place to stay when it is disabled
+    field.select.focus();
+  } }, verb);
+  return { node: element("div", { class: "select-and-do" }, field.node, button), select: field.select };
+}
+
 // The line and the marker of a layer, as the curves draw them.
 function swatch(look) {
   return drawn("svg", { viewBox: "0 0 34 14", class: "swatch", "aria-hidden": "true" },

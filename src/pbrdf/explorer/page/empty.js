@@ -21,8 +21,8 @@ function emptyState(app, files) {
   const card = (paint, i) => element("button", { type: "button", class: "paint", onclick: () => addLayer(app, paint) }, pictures[i],
     element("span", { class: "title" }, paint.name.replaceAll("-", " ")),
     element("span", { class: "kind" }, app.catalogue.models[paint.model].parameters.slice(0, 2).map(p => `${p.symbol}\u00a0=\u00a0${written(paint.parameters[p.name])}`).join(", ")));
-  const model = selectField("or a model with its default parameters", [["", [["", "choose …"], ...Object.entries(app.catalogue.models).map(([name, m]) => [name, name, m.about])]]],
-    value => { if (value) addLayer(app, defaultLayer(app, value)); model.select.value = ""; });
+  const choices = [["", "choose …"], ...Object.entries(app.catalogue.models).map(([name, m]) => [name, name, m.about])];
+  const model = selectAndDo("or a model with its default parameters", [["", choices]], "Begin", value => addLayer(app, defaultLayer(app, value)));
   app.on("answer:previews", ({ theta_i, views, outlines }) => outlines.forEach((o, i) => pictures[i].replaceChildren(...preview(theta_i, views, o))));
   app.send({ type: "previews" });
   return element("section", { class: "empty", "aria-label": "Begin" },

@@ -66,29 +66,28 @@ function render({ model, el }) {
   };
   app.on("state", show);
 
+  const begin = state => { if (state) app.replace(state); else show(); };
+  let given = null;
   app.on("answer:welcome", content => {
-    app.catalogue = content.catalogue;
     notices.lost(false);
     // after a lost connection the page's own state stands
-    if (app.state) { app.draw(); return; }
-    app.state = content.state ?? null;
-    app.tell("welcome");
+    if (app.catalogue) { app.draw(); return; }
+    app.catalogue = content.catalogue;
+    given = content.state;
     const asked = inPage ? stateOfAddress(location.hash) : null;
     if (inPage) followAddress(app, state => open(state, "the address"));
-    if (asked) { app.state = null; open(asked, "the address"); return; }
-    if (asked === undefined) open(asked, "the address");
-    if (app.state) app.tell("state", { dragging: false }); else show();
-    app.draw();
+    if (asked !== null) open(asked, "the address");
+    if (!asked) begin(given);
   });
   app.on("answer:read_state", content => app.replace(content.state));
   app.on("answer:error", content => {
-    // a state that was refused before anything was shown leaves the empty page
-    if (content.about === "read_state" && !app.state) show();
+    // an address that is refused leaves what the program was given
+    if (content.about === "read_state" && !app.state) begin(given);
     if (content.about !== "draw") app.tell("note", content.text, true);
   });
   app.on("connected", () => app.send({ type: "hello" }));
   app.send({ type: "hello" });
-  return () => { help.close(); app.end(); root.remove(); };
+  return () => { help.close(); files.close(); app.end(); root.remove(); };
 }
 
 // The panels and the views of a state.
@@ -249,6 +248,7 @@ function helpOf(inPage) {
   const keys = [
     ["Tab, Shift+Tab", "to the next or previous control"], ["← →", "move a slider by a thousandth"], ["Page Up, Page Down", "by a tenth"], ["Home, End", "to its ends"],
     ["↑ ↓ in a number", "as the slider's arrows"], ["Enter, Escape in a number", "take it, give it up"], ["Ctrl+Z, Ctrl+Shift+Z", "undo, redo"],
+    ["← → in the curves", "from point to point, or along them"], ["Space in the curves", "switch the point off or on"],
   ];
   const dialog = element("dialog", { class: "help", "aria-label": "Help" },
     element("header", {}, element("h2", {}, "Help"), iconButton("remove", "Close the help", () => dialog.close())),

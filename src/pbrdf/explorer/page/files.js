@@ -1,9 +1,12 @@
 // Files that the reader drops or chooses: saved states, and what pbrdf opens, models, data, fits and maps.
 
-// Bytes at most, of a state and of what the server takes.
-const MOST_STATE = 1 << 20, MOST_BYTES = 48 << 20;
+// Bytes of a state, at most.
+const MOST_STATE = 1 << 20;
 
 function openFiles(app, el) {
+  const asker = askerOf(app, el);
+  let mostBytes = Infinity;
+  app.on("answer:welcome", content => { mostBytes = content.most_bytes; });
   const input = element("input", { type: "file", multiple: true, class: "unseen", tabindex: -1, "aria-hidden": "true", onchange: async () => {
     await take([...input.files]);
     input.value = "";
@@ -14,11 +17,8 @@ function openFiles(app, el) {
     for (const file of files) {
       const state = await stateIn(file);
       if (state) app.send({ type: "read_state", state, from: file.name });
-      else if (file.size > MOST_BYTES) app.tell("note", `${file.name}: ${Math.round(file.size / 1e6)} MB are more than the page takes; open it with pbrdf explore ${file.name}`);
-      else {
-        app.tell("note", `Opening ${file.name} …`, true);
-        app.send({ type: "open", name: file.name }, [await file.arrayBuffer()]);
-      }
+      else if (file.size > mostBytes) app.tell("note", `${file.name}: ${Math.round(file.size / 1e6)} MB are more than the page takes; open it with pbrdf explore ${file.name}`);
+      else await asker.send(file);
     }
   }
   app.on("answer:opened", ({ name, layers, datasets, maps }) => {
@@ -38,7 +38,7 @@ function openFiles(app, el) {
     event.preventDefault();
     take([...event.dataTransfer.files]);
   });
-  return { choose: () => input.click(), take };
+  return { choose: () => input.click(), take, close: asker.close };
 }
 
 // The state that a file holds, null where it holds something else.

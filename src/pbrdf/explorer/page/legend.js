@@ -1,4 +1,5 @@
-// What views have in common beside fields: a bar of the colours with its ends in words, canvases as sharp as the screen.
+// What views have in common beside fields: a bar of the colours with its ends in words, and canvases as sharp as the
+// screen.
 
 class ColourLegend {
   constructor() {
@@ -6,12 +7,14 @@ class ColourLegend {
     this.least = element("span", {});
     this.about = element("span", {});
     this.most = element("span", {});
-    this.node = element("div", { class: "colour-legend" }, this.bar, element("div", {}, this.least, this.about, this.most));
+    this.node = element("div", { class: "colour-legend" }, this.bar,
+      element("div", {}, this.least, this.about, this.most));
   }
 
   // `table` has 256 colours of four bytes, `ends` are the numbers at both ends.
   show(table, ends, unit, about) {
-    if (this.table !== table) this.bar.getContext("2d").putImageData(new ImageData(new Uint8ClampedArray(table), 256, 1), 0, 0);
+    const colours = new ImageData(new Uint8ClampedArray(table), 256, 1);
+    if (this.table !== table) this.bar.getContext("2d").putImageData(colours, 0, 0);
     this.table = table;
     [this.least.textContent, this.most.textContent] = ends.map(end => `${written(end)} ${unit}`.trim());
     this.about.textContent = about;

@@ -32,6 +32,8 @@ _EVEN, _NEAR = 361, 81
 _GRAZING, _PEAK = 89.0, 4.0
 #: How far a point may be off the line: zenith angles and azimuths, degrees.
 _NEARBY, _NEARBY_AZIMUTH = 0.3, 1.0
+#: Points that are drawn of a line, at most: more are one black band, and slow.
+_MOST_POINTS = 500
 #: Where half a turn of angles of polarisation begins, degrees.
 _STARTS = (-45.0, 45.0)
 #: Where the mirror direction is on a line, in shares of what is constant there.
@@ -80,6 +82,10 @@ def draw(state: State, workspace: Workspace, dragging: bool) -> tuple[dict[str, 
     accuracy = "fast" if dragging else "default"
     shown = [i for i, layer in enumerate(state.layers) if layer.shown]
     wanted = {*shown, state.active, *(() if state.compare is None else (state.compare,))}
+    if len(line.rows) > _MOST_POINTS:
+        some = np.linspace(0, len(line.rows) - 1, _MOST_POINTS).round().astype(int)
+        note = f"{_MOST_POINTS} of the {len(line.rows)} points on this line are drawn."
+        line = replace(line, rows=line.rows[some], at=line.at[some])
     size, angles, light = len(line.x), line.angles, np.asarray(state.light.stokes)
     curves = {
         i: _curves(state.layers[i].model.with_accuracy(accuracy), state, angles, light)
@@ -202,7 +208,9 @@ def _along_cut(cut: Cut, cuts: ShownCuts) -> Line:
     if cut.kind == "theta_i":
         low, high = -_GRAZING, _GRAZING
     mirrors = [abs(cut.constant) * _MIRROR[cut.kind]] if cut.kind in _MIRROR else []
-    x = np.unique(np.concatenate([_with_peak(low, high, mirrors), cut.x]))
+    x = _with_peak(low, high, mirrors)
+    if len(cut.x) <= _MOST_POINTS:
+        x = np.unique(np.concatenate([x, cut.x]))
     along = replace(cut, path_x=x)
     axis = (
         "angle of incidence θi (°)" if cut.over_incidence else "viewing angle θr (°), − on the source's side"

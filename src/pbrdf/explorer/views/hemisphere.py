@@ -31,7 +31,7 @@ def draw(state: State, workspace: Workspace, dragging: bool) -> tuple[dict[str, 
     ranges = _ranges(state.settings.get("hemisphere", {}))
     pictures, planes = fields(state, state.quantities, GRID, dragging)
     if not dragging:
-        prepare(state, state.quantities, GRID)
+        prepare(state, state.quantities, lambda: fields(state, state.quantities, GRID, True))
     shown = []
     for picture in pictures:
         content = described(picture, difference)

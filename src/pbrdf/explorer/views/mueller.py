@@ -19,7 +19,7 @@ def draw(state: State, workspace: Workspace, dragging: bool) -> tuple[dict[str, 
     """m00, logarithmic, and the other elements as parts of it; of two models the differences."""
     pictures, planes = fields(state, ELEMENTS, GRID, dragging)
     if not dragging:
-        prepare(state, ELEMENTS, GRID)
+        prepare(state, ELEMENTS, lambda: fields(state, ELEMENTS, GRID, True))
     header = {
         "grid": [GRID.zeniths, GRID.azimuths],
         "pictures": [{**described(p, state.compare is not None), "range": None} for p in pictures],

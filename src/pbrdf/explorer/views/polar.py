@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from pbrdf.explorer.evaluation import Grid, described, fields
+from pbrdf.explorer.evaluation import Grid, described, fields, prepare
 from pbrdf.explorer.state import QUANTITIES, State, StateError, number
 from pbrdf.explorer.workspace import Workspace
 
@@ -48,6 +48,8 @@ def draw(state: State, workspace: Workspace, dragging: bool) -> tuple[dict[str, 
         halved = picture.plane == picture.mirrored
         value = plane if halved else np.concatenate([plane, picture.sign * mirrored[:, -2::-1]], axis=1)
         values.append(10.0**value if shown["logarithmic"] else value)
+    if not dragging:
+        prepare(state, ["polar", quantity], lambda: draw(state, workspace, True))
     most = max(float(np.abs(v).max()) for v in values)
     most = 90.0 if quantity == "aolp" else most if most > 0.0 else 1.0
     header = {

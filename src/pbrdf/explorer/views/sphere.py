@@ -22,14 +22,14 @@ import numpy as np
 
 from pbrdf.backend import get_backend
 from pbrdf.errors import DataError
-from pbrdf.explorer.evaluation import mueller_matrix
+from pbrdf.explorer.evaluation import mueller_matrix, prepare
 from pbrdf.explorer.state import Light, State, StateError, number
 from pbrdf.explorer.workspace import Workspace
 from pbrdf.instruments.goniometer.rays import UPRIGHT, across, angles_of
 from pbrdf.instruments.pixel_geometry.camera import Lamp, PixelCamera
 from pbrdf.instruments.pixel_geometry.geometry import plane_rotation
 from pbrdf.models.base import Model
-from pbrdf.optics.elements import diattenuator, rotate_frame
+from pbrdf.optics.elements import diattenuator
 
 __all__ = ["LAMP", "MODES", "POLARISERS", "draw", "picture"]
 
@@ -51,7 +51,7 @@ _MIRROR = (1.0, 1.0, -1.0, -1.0)
 
 @dataclass(frozen=True)
 class _Ball:
-    """The grid under a lamp, shapes (rows, columns of a turn).
+    """The grid under a lamp at the azimuth 0, shapes (rows, columns of a turn).
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class _Ball:
     cosine
         Of the angle of incidence, 0 in the shadow.
     turn
-        cos2χ and sin2χ of the turn from (p, s) to the camera's axes.
+        cos2χ and sin2χ of the turn from the camera's axes to (p, s).
     light_turn
         Those of the turn from the light's own (p, s) to that of the place.
     """
@@ -86,6 +86,12 @@ class _Ball:
         cos, sin = (x[:, :columns] for x in self.light_turn)
         return [i, cos * q + sin * u, cos * u - sin * q, v]
 
+    def to_camera(self, q: np.ndarray, u: np.ndarray, azimuth: float) -> tuple[np.ndarray, np.ndarray]:
+        """Q and U of the places' (p, s) in the camera's axes, with the lamp at an azimuth."""
+        c, s = (np.float32(f(2.0 * azimuth)) for f in (math.cos, math.sin))
+        cos, sin = self.turn[0] * c - self.turn[1] * s, self.turn[1] * c + self.turn[0] * s
+        return cos * q - sin * u, sin * q + cos * u
+
 
 def draw(state: State, workspace: Workspace, dragging: bool) -> tuple[dict[str, Any], list[bytes]]:
     """Radiance and Q/I, U/I, V/I in the camera's frame, shape (rows, columns, 4), float16.
@@ -102,6 +108,8 @@ def draw(state: State, workspace: Workspace, dragging: bool) -> tuple[dict[str, 
     fields = [
         picture(layer.model.with_accuracy(accuracy), lamp, state.light, state.part, shape) for layer in layers
     ]
+    if not dragging:
+        prepare(state, ["ball"], lambda: draw(state, workspace, True))
     header = {
         "shape": list(fields[0].shape),
         "channels": ["radiance", "q", "u", "v"],
@@ -136,7 +144,7 @@ def picture(model: Model, lamp: Lamp, light: Light, part: str, shape: tuple[int,
         Shape (rows, columns of a turn, 4). The columns go counterclockwise from the lamp's side, the last is the
         first. Where no light falls the radiance is 0.
     """
-    ball = _ball(lamp.polar, lamp.azimuth, *shape)
+    ball = _ball(lamp.polar, *shape)
     halved = light.stokes[2] == light.stokes[3] == 0.0
     natural = halved and light.stokes[1] == 0.0
     columns = shape[1] if halved else 2 * shape[1] - 1
@@ -154,52 +162,44 @@ def picture(model: Model, lamp: Lamp, light: Light, part: str, shape: tuple[int,
     inverse = 1.0 / np.maximum(S[0], 1e-30)
     radiance = np.minimum(S[0] * ball.cosine, _MOST)
     q, u, v = (x * inverse for x in S[1:])
-    cos, sin = ball.turn
-    return np.stack([radiance, cos * q + sin * u, cos * u - sin * q, v], axis=-1)
+    return np.stack([radiance, *ball.to_camera(q, u, lamp.azimuth), v], axis=-1)
 
 
 @lru_cache(maxsize=4)
-def _ball(polar: float, azimuth: float, rows: int, half: int) -> _Ball:
+def _ball(polar: float, rows: int, half: int) -> _Ball:
     """The grid under a lamp; kept, as sliders of a model leave the lamp where it is."""
-    lamp = Lamp(polar, azimuth)
     theta_r = np.deg2rad(np.linspace(0.0, RIM, rows))[:, None]
-    around = azimuth + np.linspace(0.0, 2.0 * np.pi, 2 * half - 1)
-    normal = np.stack(
-        np.broadcast_arrays(
-            np.sin(theta_r) * np.cos(around), np.sin(theta_r) * np.sin(around), np.cos(theta_r)
-        ),
-        axis=-1,
-    )
+    around = np.linspace(0.0, np.pi, half)
+    across_view = np.sin(theta_r)
+    normal = np.empty((rows, half, 3))
+    normal[..., 0], normal[..., 1] = across_view * np.cos(around), across_view * np.sin(around)
+    normal[..., 2] = np.cos(theta_r)
     view = PixelCamera().view(np.zeros(1), np.zeros(1))
-    source = lamp.direction
+    source = Lamp(polar).direction
     theta_i, _, phi = angles_of(normal, source, view)
-    to_camera = rotate_frame(-plane_rotation(normal, view, source))
+    rotation = plane_rotation(normal, view, source)
     # the light's own p is that of the middle of the ball, also where the lamp is beside the camera
-    level = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
-    p = -np.cos(polar) * level + np.array([0.0, 0.0, np.sin(polar)])
+    p = np.array([-math.cos(polar), 0.0, math.sin(polar)])
     s = np.cross(p, source)  # p×s = k = −source
-    # lit along the normal φ is 0 and p points to the side of the camera; seen along it too, the reflected light's p is
-    # the camera's x, and that of the light its opposite
-    upright = across(view, source)
-    if np.linalg.norm(upright) < UPRIGHT:
-        upright = np.array([-1.0, 0.0, 0.0])
     there = across(normal, source)
-    there = np.where(np.linalg.norm(there, axis=-1, keepdims=True) < UPRIGHT, upright, there)
-    to_place = rotate_frame(np.arctan2(there @ s, there @ p))
-    most = math.radians(RIM)
-    shape = theta_i.shape
-    directions = tuple(np.broadcast_to(x, shape) for x in (np.minimum(theta_i, most), theta_r, phi))
-    return _Ball(
-        directions,
-        np.cos(theta_i).clip(0.0).astype(np.float32),
-        _double_angle(to_camera),
-        _double_angle(to_place),
+    # lit along the normal φ is 0 and p points to the side of the camera; seen along it too that is p itself
+    lit_along = np.linalg.norm(there, axis=-1, keepdims=True) < UPRIGHT
+    to_place = np.arctan2(*(np.where(lit_along, p, there) @ axis for axis in (s, p)))
+
+    def whole(values: np.ndarray, sign: float = 1.0) -> np.ndarray:
+        return np.concatenate([values, sign * values[:, -2::-1]], axis=1)
+
+    def turn(angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        double = (2.0 * angle).astype(np.float32)
+        return whole(np.cos(double)), whole(np.sin(double), -1.0)
+
+    directions = (
+        whole(np.minimum(theta_i, math.radians(RIM))),
+        np.broadcast_to(theta_r, (rows, 2 * half - 1)),
+        whole(phi, -1.0),
     )
-
-
-def _double_angle(frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """cos2χ and sin2χ of changes of frame."""
-    return frames[..., 1, 1].astype(np.float32), frames[..., 1, 2].astype(np.float32)
+    cosine = whole(np.cos(theta_i).clip(0.0)).astype(np.float32)
+    return _Ball(directions, cosine, turn(rotation), turn(to_place))
 
 
 def _ranges(fields: list[np.ndarray]) -> dict[str, float]:

@@ -91,7 +91,18 @@ PANELS.push({
       asked = null;
       app.change(state => { state.settings.data = { set: datasets[0] }; }, ONLY_CUTS);
     });
-    app.on("answer:error", content => { if (content.about === "data") fault.textContent = content.text; });
+    // settings of other data, from a state that was sent: they can be given up
+    app.on("answer:error", content => {
+      if (content.about !== "data") return;
+      fault.textContent = content.text;
+      described = offButton = null;
+      words.hidden = true;
+      inside.hidden = false;
+      inside.replaceChildren(element("button", { type: "button", onclick: () => {
+        asked = null;
+        app.change(state => { delete state.settings.data; }, ONLY_CUTS);
+      } }, "Show what is open, all of its points"));
+    });
     return {
       update(state) {
         if (asked !== chosen(state)) ask();

@@ -2,9 +2,9 @@
 
 const EXPORTS = [
   ["Figures of all shown models", [["curves", "curves in the plane of incidence"], ["hemisphere", "hemispheres"], ["surface", "polar surfaces"], ["mueller", "Mueller elements"]]],
-  ["Of the active model", [["overview", "figure: overview"], ["plane", "table: plane of incidence"], ["directions", "table: all directions"], ["model", "model file"]]],
+  ["Of the active model", [["overview", "figure: overview"], ["plane", "table: plane of incidence"], ["directions", "table: all directions"], ["model", "model file"], ["fit", "fit to the data: the command"]]],
 ];
-const FORMATS_OF = { plane: ["csv"], directions: ["csv"], model: ["json"] }, FIGURE_FORMATS = ["png", "svg", "pdf"];
+const FORMATS_OF = { fit: [], plane: ["csv"], directions: ["csv"], model: ["json"] }, FIGURE_FORMATS = ["png", "svg", "pdf"];
 
 PANELS.push({
   name: "export",
@@ -15,7 +15,8 @@ PANELS.push({
     const choose = () => {
       const formats = FORMATS_OF[what.select.value] ?? FIGURE_FORMATS;
       format.select.replaceChildren(...formats.map(f => element("option", { value: f }, f.toUpperCase())));
-      format.select.disabled = formats.length === 1;
+      format.select.disabled = formats.length <= 1;
+      save.textContent = what.select.value === "fit" ? "Show" : "Save";
     };
     const save = element("button", { type: "button", onclick: () => {
       save.disabled = true;
@@ -33,9 +34,9 @@ PANELS.push({
     choose();
     app.on("answer:exported", (content, [file]) => {
       save.disabled = false;
-      download(content.name, [file], content.media);
-      const files = content.command && /\.json\b/.test(content.command) ? " The command reads the models' files: save those, too." : "";
-      said.textContent = `${content.name} is saved${content.note ? `; ${content.note}` : ""}.${files}`;
+      if (file) download(content.name, [file], content.media);
+      const files = file && content.command && /\.json\b/.test(content.command) ? "the command reads the models' files: save those, too" : "";
+      said.textContent = [file ? `${content.name} is saved` : "", content.note, files].filter(Boolean).join("; ");
       command.textContent = content.command ?? "";
       line.hidden = !content.command;
     });

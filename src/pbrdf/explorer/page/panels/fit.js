@@ -11,7 +11,7 @@ PANELS.push({
     const list = element("div", { class: "list" });
     const startsId = freshId("starts");
     const starts = element("input", { type: "number", id: startsId, class: "number", min: 1, max: 256, step: 1, onchange: () => set(settings => { settings.starts = Number(starts.value); }) });
-    const begin = element("button", { type: "button", class: "fit", onclick: () => app.send({ type: "fit", state: app.state }) }, "Fit from here");
+    const begin = element("button", { type: "button", class: "first", onclick: () => app.send({ type: "fit", state: app.state }) }, "Fit from here");
     const cancel = element("button", { type: "button", disabled: true, onclick: () => app.send({ type: "cancel_fit" }) }, "Cancel");
     const bar = element("progress", { max: 1, value: 0, "aria-label": "Starts that are done" });
     const status = element("p", { role: "status", class: "about" });

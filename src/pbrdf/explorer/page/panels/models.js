@@ -41,14 +41,13 @@ PANELS.push({
   build(place, app) {
     const list = element("ul", { class: "layers" }), group = freshId("active");
     const { models, paints, looks } = app.catalogue;
-    const adding = selectField("Add", [
+    const adding = selectAndDo("Another model", [
       ["", [["", "a paint or a model …"]]],
       ["Paints", paints.map((paint, i) => [`paint:${i}`, paint.name])],
       ["Models with their default parameters", Object.entries(models).map(([name, model]) => [`model:${name}`, name, model.about])],
-    ], value => {
+    ], "Add", value => {
       const [kind, which] = [value.slice(0, 5), value.slice(6)];
-      adding.select.value = "";
-      if (which) addLayer(app, kind === "paint" ? paints[which] : defaultLayer(app, which));
+      addLayer(app, kind === "paint" ? paints[which] : defaultLayer(app, which));
     });
     const comparing = selectField("Difference to", [["", [["", "none"]]]], value => app.change(state => {
       state.compare = value === "" ? null : Number(value);

@@ -14,6 +14,14 @@ const CUT_MANY_TICKS = 5;
 const doubles = view => new Float64Array(view.buffer.slice(view.byteOffset, view.byteOffset + view.byteLength));
 const singles = view => new Float32Array(view.buffer.slice(view.byteOffset, view.byteOffset + view.byteLength));
 
+// A value with its standard uncertainty, two digits of the latter.
+function withError(value, std) {
+  if (!(std > 0)) return written(value, 4);
+  const decimals = 1 - Math.floor(Math.log10(std));
+  if (decimals < 0 || decimals > 9) return `${written(value, 4)} ± ${written(std, 2)}`;
+  return `${value.toFixed(decimals)} ± ${std.toFixed(decimals)}`.replace("-", "−");
+}
+
 // Steps of 1, 2 or 5 times a power of ten between two numbers.
 function evenTicks(low, high, count = CUT_MANY_TICKS) {
   const rough = (high - low) / count, power = 10 ** Math.floor(Math.log10(rough));
@@ -300,9 +308,8 @@ VIEWS.push({
         if (point === null) return `${label}: ${models.join(", ") || "none"}`;
         const [measured, std, deviation, weight] = [0, 1, 2, 3].map(j => points[(4 * k + j) * at.length + point]);
         if (!Number.isFinite(measured)) return `${label}: not measured`;
-        const bar = std > 0 ? ` ± ${written(std, 2)}` : "";
         const far = Number.isFinite(deviation) ? `, ${written(deviation, 2)} standard deviations from the model, weight ${written(weight, 2)}` : "";
-        return `${label}: measured ${written(measured, 4)}${bar}, ${models.join(", ")}${far}`;
+        return `${label}: measured ${withError(measured, std)}, ${models.join(", ")}${far}`;
       });
       const kind = point === null ? "" : header.off[point] ? "switched off, " : header.held_out[point] ? "held out, " : "used, ";
       const text = `${kind}${written(there, 4)}°: ${parts.join("; ")}`;
@@ -390,7 +397,7 @@ VIEWS.push({
           const numbers = header.quantities.flatMap((_, k) => {
             const [measured, std, deviation] = [0, 1, 2].map(j => value(k, j, i));
             if (!Number.isFinite(measured)) return ["–", "–"];
-            return [written(measured, 4) + (std > 0 ? ` ± ${written(std, 2)}` : ""), Number.isFinite(deviation) ? written(deviation, 2) : "–"];
+            return [withError(measured, std), Number.isFinite(deviation) ? written(deviation, 2) : "–"];
           });
           return element("tr", {}, element("td", {}, box), [`${written(x, 4)}°`, ...numbers].map(text => element("td", {}, text)));
         })));

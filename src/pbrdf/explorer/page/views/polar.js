@@ -69,28 +69,46 @@ const QUANTITY_TITLES = { intensity: "Intensity", dolp: "DoLP", aolp: "AoLP", q:
 const quantityTitle = name => QUANTITY_TITLES[name] ?? `M${name[1]}${name[2]}`;
 const rgbOf = hex => [1, 3, 5].map(at => parseInt(hex.slice(at, at + 2), 16) / 255);
 
+// Whether there is no graphics card.
+let processorDraws = null;
+function drawnByProcessor() {
+  if (processorDraws === null) {
+    const gl = document.createElement("canvas").getContext("webgl2");
+    const name = gl?.getExtension("WEBGL_debug_renderer_info")?.UNMASKED_RENDERER_WEBGL ?? gl?.RENDERER;
+    processorDraws = /swiftshader|llvmpipe|software|basic render/i.test(gl?.getParameter(name) ?? "");
+    gl?.getExtension("WEBGL_lose_context")?.loseContext();
+  }
+  return processorDraws;
+}
+
 VIEWS.push({
   name: "polar",
   title: "Polar surface",
   build(place, app) {
     const label = "Polar surface; the arrow keys turn it, Home turns it back";
-    const canvas = element("canvas", { width: 600, height: 450, tabindex: 0, role: "application", "aria-label": label, "aria-roledescription": "turnable picture" });
+    const canvas = element("canvas", { width: 600, height: 450, tabindex: 0, role: "application", "aria-label": label,
+      "aria-roledescription": "turnable picture" });
     const words = element("canvas", { width: 600, height: 450, "aria-hidden": "true" });
     const frame = element("div", { class: "turnable" }, canvas, words);
-    // the first to ask decides: lines and edges want smoothing, which fields do not
-    canvas.getContext("webgl2", { antialias: true, preserveDrawingBuffer: true });
+    // the first to ask decides; where the processor draws, smooth edges would take most of its time
+    canvas.getContext("webgl2", { antialias: !drawnByProcessor(), preserveDrawingBuffer: true });
     const graphics = new Graphics(canvas, SURFACE, SURFACE_VERTEX), gl = graphics.gl;
-    const tables = Object.fromEntries(Object.entries(app.catalogue.colours).map(([name, text]) => [name, decoded(text)]));
+    const tables = Object.fromEntries(Object.entries(app.catalogue.colours).map(([name, text]) =>
+      [name, decoded(text)]));
     let header = null, fields = [], surface = null, net = null, meshed = "", values = null;
 
-    const settings = () => ({ quantity: "intensity", scale: "linear", turn: header?.eye[0] ?? 0, tilt: header?.eye[1] ?? 0, ...app.state?.settings.polar });
+    const settings = () => ({ quantity: "intensity", scale: "linear", turn: header?.eye[0] ?? 0,
+      tilt: header?.eye[1] ?? 0, ...app.state?.settings.polar });
     const set = (values, { dragging = false, views = [] } = {}) => app.change(state => {
       state.settings.polar = { ...state.settings.polar, ...values };
     }, { dragging, views });
     const named = names => names.map(name => [name, quantityTitle(name)]), known = app.catalogue.quantities;
-    const quantity = selectField("Distance from the origin", [[null, named(known.filter(name => name in QUANTITY_TITLES))], ["Mueller elements", named(known.filter(name => !(name in QUANTITY_TITLES)))]],
+    const quantity = selectField("Distance from the origin",
+      [[null, named(known.filter(name => name in QUANTITY_TITLES))],
+      ["Mueller elements", named(known.filter(name => !(name in QUANTITY_TITLES)))]],
       value => set({ quantity: value }, { views: ["polar"] }), { name: "polar-quantity" });
-    const scale = choiceRow("Scale", [{ value: "linear", text: "linear" }, { value: "logarithmic", text: "log", title: "logarithmic" }], value => set({ scale: value }, { views: ["polar"] }));
+    const scales = [{ value: "linear", text: "linear" }, { value: "logarithmic", text: "log", title: "logarithmic" }];
+    const scale = choiceRow("Scale", scales, value => set({ scale: value }, { views: ["polar"] }));
     quantity.node.dataset.place = "settings.polar.quantity";
     scale.node.dataset.place = "settings.polar.scale";
     const legend = new ColourLegend();
@@ -124,21 +142,32 @@ VIEWS.push({
     // The plane below with its azimuths, the light and its mirror direction: lists of points, width, colour.
     function scenery(theta) {
       const dark = app.theme === "dark";
-      const ground = dark ? [0.4, 0.4, 0.42, 1] : [0.72, 0.72, 0.74, 1], red = dark ? [1, 0.5, 0.35, 1] : [0.75, 0.2, 0, 1];
-      const circle = radius => Array.from({ length: 73 }, (_, i) => [radius * Math.cos(i * Math.PI / 36), radius * Math.sin(i * Math.PI / 36), 0]);
+      const ground = dark ? [0.4, 0.4, 0.42, 1] : [0.72, 0.72, 0.74, 1];
+      const red = dark ? [1, 0.5, 0.35, 1] : [0.75, 0.2, 0, 1];
+      const circle = radius => Array.from({ length: 73 }, (_, i) =>
+        [radius * Math.cos(i * Math.PI / 36), radius * Math.sin(i * Math.PI / 36), 0]);
       const source = [-Math.sin(theta), 0, Math.cos(theta)], mirror = [Math.sin(theta), 0, Math.cos(theta)];
       const along = (vector, length) => vector.map(c => c * length);
-      const tip = along(source, 0.75), back = along(source, 0.85), aside = [Math.cos(theta) * 0.04, 0, Math.sin(theta) * 0.04];
+      const tip = along(source, 0.75), back = along(source, 0.85),
+        aside = [Math.cos(theta) * 0.04, 0, Math.sin(theta) * 0.04];
       const found = [{ points: circle(0.5), width: 1, ink: ground }, { points: circle(1), width: 1, ink: ground }];
-      for (let k = 0; k < 8; k++) found.push({ points: [[0, 0, 0], [Math.cos(k * Math.PI / 4), Math.sin(k * Math.PI / 4), 0]], width: 1, ink: ground });
+      for (let k = 0; k < 8; k++) {
+        const end = [Math.cos(k * Math.PI / 4), Math.sin(k * Math.PI / 4), 0];
+        found.push({ points: [[0, 0, 0], end], width: 1, ink: ground });
+      }
       found.push({ points: [[0, 0, 0], [0, 0, 1.1]], width: 1, ink: ground });
       found.push({ points: [along(source, 1.2), tip], width: 2, ink: red });
-      for (const side of [1, -1]) found.push({ points: [tip, back.map((c, i) => c + side * aside[i])], width: 2, ink: red });
+      for (const side of [1, -1]) {
+        found.push({ points: [tip, back.map((c, i) => c + side * aside[i])], width: 2, ink: red });
+      }
       for (const side of [0.04, -0.04]) found.push({ points: [tip, [back[0], side, back[2]]], width: 2, ink: red });
-      for (let k = 0; k < 12; k++) found.push({ points: [along(mirror, k / 10), along(mirror, (k + 0.5) / 10)], width: 1.5, ink: red });
+      for (let k = 0; k < 12; k++) {
+        found.push({ points: [along(mirror, k / 10), along(mirror, (k + 0.5) / 10)], width: 1.5, ink: red });
+      }
       const ink = dark ? "#d8d8dc" : "#333336", signal = dark ? "#ff9a80" : "#a63000";
       const labels = [
-        [[1.17, 0, 0], "forward 0°", ink], [[0, 1.17, 0], "90°", ink], [[-1.17, 0, 0], "back 180°", ink], [[0, -1.17, 0], "−90°", ink],
+        [[1.17, 0, 0], "forward 0°", ink], [[0, 1.17, 0], "90°", ink], [[-1.17, 0, 0], "back 180°", ink],
+          [[0, -1.17, 0], "−90°", ink],
         [[0, 0, 1.17], "normal", ink], [along(source, 1.28), "light", signal], [along(mirror, 1.28), "mirror", signal],
       ];
       return { lines: found, labels };
@@ -147,33 +176,43 @@ VIEWS.push({
     // The eye's axes as rows: to the right, upwards, towards the eye.
     function axes() {
       const { turn, tilt } = settings(), a = turn * Math.PI / 180, e = tilt * Math.PI / 180;
-      return [[-Math.sin(a), Math.cos(a), 0], [-Math.sin(e) * Math.cos(a), -Math.sin(e) * Math.sin(a), Math.cos(e)], [Math.cos(e) * Math.cos(a), Math.cos(e) * Math.sin(a), Math.sin(e)]];
+      return [[-Math.sin(a), Math.cos(a), 0], [-Math.sin(e) * Math.cos(a), -Math.sin(e) * Math.sin(a), Math.cos(e)],
+        [Math.cos(e) * Math.cos(a), Math.cos(e) * Math.sin(a), Math.sin(e)]];
     }
     const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 
     // From places of the surface to the canvas: zoom and what stands in its middle.
     function projection() {
-      const tilt = settings().tilt * Math.PI / 180, low = -1.2 * Math.abs(Math.sin(tilt)), high = Math.max(1.25 * Math.cos(tilt), -low);
+      const tilt = settings().tilt * Math.PI / 180, low = -1.2 * Math.abs(Math.sin(tilt)),
+        high = Math.max(1.25 * Math.cos(tilt), -low);
       const zoom = Math.min(1 / 1.4, canvas.height / canvas.width / ((high - low) / 2 + 0.06));
       return { zoom: [zoom, zoom * canvas.width / canvas.height], middle: [0, (high + low) / 2] };
     }
 
-    const strokes = gl.createBuffer(), slots = ["start", "end"].map(name => gl.getAttribLocation(graphics.program, name));
+    const strokes = gl.createBuffer(), slots = ["start", "end"].map(name =>
+      gl.getAttribLocation(graphics.program, name));
     function stroke(lines) {
-      const corners = [], ends = [];
-      for (const { points } of lines) {
-        for (let i = 0; i + 1 < points.length; i++) for (let k = 0; k < 6; k++) corners.push(...points[i], ...points[i + 1]);
-        ends.push(corners.length / 6);
+      const corners = [], groups = [];
+      for (const { points, width, ink } of lines) {
+        for (let i = 0; i + 1 < points.length; i++) {
+          for (let k = 0; k < 6; k++) corners.push(...points[i], ...points[i + 1]);
+        }
+        // a call for all that look alike: where the processor draws, calls are dear
+        const before = groups.at(-1);
+        if (before?.width !== width || before.ink !== ink) groups.push({ width, ink, first: before?.end ?? 0 });
+        groups.at(-1).end = corners.length / 6;
       }
       gl.bindBuffer(gl.ARRAY_BUFFER, strokes);
       gl.bufferData(gl.ARRAY_BUFFER, new Float32Array(corners), gl.STREAM_DRAW);
-      slots.forEach((slot, i) => { gl.enableVertexAttribArray(slot); gl.vertexAttribPointer(slot, 3, gl.FLOAT, false, 24, 12 * i); });
-      lines.forEach(({ width, ink }, i) => {
+      slots.forEach((slot, i) => {
+        gl.enableVertexAttribArray(slot);
+        gl.vertexAttribPointer(slot, 3, gl.FLOAT, false, 24, 12 * i);
+      });
+      for (const { width, ink, first, end } of groups) {
         graphics.vector("ink", ink);
         graphics.number("width", width * (window.devicePixelRatio || 1));
-        const first = i ? ends[i - 1] : 0;
-        gl.drawArrays(gl.TRIANGLES, first, ends[i] - first);
-      });
+        gl.drawArrays(gl.TRIANGLES, first, end - first);
+      }
       slots.forEach(slot => gl.disableVertexAttribArray(slot));
     }
 
@@ -220,7 +259,8 @@ VIEWS.push({
       for (const [point, text, ink] of labels) {
         const [x, y] = onCanvas(point, eye, zoom, middle), half = pen.measureText(text).width / 2 + 2 * ratio;
         pen.fillStyle = ink;
-        pen.fillText(text, Math.min(Math.max(x, half), canvas.width - half), Math.min(Math.max(y, 8 * ratio), canvas.height - 8 * ratio));
+        pen.fillText(text, Math.min(Math.max(x, half), canvas.width - half),
+          Math.min(Math.max(y, 8 * ratio), canvas.height - 8 * ratio));
       }
     }
     const onCanvas = (point, eye, zoom, middle) => [
@@ -230,10 +270,13 @@ VIEWS.push({
 
     function tell() {
       const signed = header.colours === "signed", angle = header.colours === "cyclic", { most } = header;
-      const low = header.scale === "logarithmic" && !signed && !angle ? most * 10 ** -header.decades : signed || angle ? -most : 0;
-      legend.show(tables[header.colours], [low, most], "", header.scale === "logarithmic" && !angle ? `${header.title}, ${header.decades} decades` : header.title);
+      const logarithmic = header.scale === "logarithmic" && !angle;
+      const low = signed || angle ? -most : logarithmic ? most * 10 ** -header.decades : 0;
+      const title = logarithmic ? `${header.title}, ${header.decades} decades` : header.title;
+      legend.show(tables[header.colours], [low, most], "", title);
       models.replaceChildren(...header.layers.flatMap((layer, i) => [
-        i ? swatch({ ...app.catalogue.looks[layer], dash: [] }) : "", `${i ? " net" : "surface"}: ${app.state.layers[layer]?.name ?? ""} `,
+        i ? swatch({ ...app.catalogue.looks[layer], dash: [] }) : "",
+          `${i ? " net" : "surface"}: ${app.state.layers[layer]?.name ?? ""} `,
       ]));
     }
 
@@ -257,10 +300,13 @@ VIEWS.push({
       const eye = axes(), { zoom, middle } = projection(), reach = 6 * ratio;
       let best = null;
       for (let row = 0; row < rows; row++) for (let column = 0; column < columns; column++) {
-        const beyond = header.halved && 2 * column >= columns, cell = 4 * (row * some + (beyond ? columns - 1 - column : column));
+        const beyond = header.halved && 2 * column >= columns,
+          cell = 4 * (row * some + (beyond ? columns - 1 - column : column));
         const zenith = header.rim * row / (rows - 1), turn = 2 * Math.PI * column / (columns - 1), r = values[cell];
-        const point = [r * Math.sin(zenith) * Math.cos(turn), r * Math.sin(zenith) * Math.sin(turn), r * Math.cos(zenith)];
-        const [px, py] = onCanvas(point, eye, zoom, middle), away = Math.hypot(px - x, py - y), near = dot(eye[2], point);
+        const point = [r * Math.sin(zenith) * Math.cos(turn), r * Math.sin(zenith) * Math.sin(turn),
+          r * Math.cos(zenith)];
+        const [px, py] = onCanvas(point, eye, zoom, middle), away = Math.hypot(px - x, py - y),
+          near = dot(eye[2], point);
         if (away > reach || (best && near - away / canvas.width < best.near)) continue;
         best = { near: near - away / canvas.width, zenith, turn, share: values[cell + 2], beyond };
       }
@@ -268,11 +314,13 @@ VIEWS.push({
       const odd = best.beyond && header.mirrored;
       const share = odd ? -best.share : best.share, azimuth = best.turn > Math.PI ? best.turn - 2 * Math.PI : best.turn;
       const degrees = a => `${Math.round(a * 180 / Math.PI)}°`.replace("-", "−");
-      readout.textContent = `θr ${degrees(best.zenith)}, φ ${degrees(azimuth)}: ${header.title} ${written(share * header.most)}`;
+      const value = written(share * header.most);
+      readout.textContent = `θr ${degrees(best.zenith)}, φ ${degrees(azimuth)}: ${header.title} ${value}`;
     }
 
     const turned = (turn, tilt, dragging) => set({
-      turn: Math.round(((turn + 540) % 360 - 180) * 10) / 10, tilt: Math.round(Math.min(Math.max(tilt, -20), 90) * 10) / 10,
+      turn: Math.round(((turn + 540) % 360 - 180) * 10) / 10,
+        tilt: Math.round(Math.min(Math.max(tilt, -20), 90) * 10) / 10,
     }, { dragging });
     let grip = null;
     canvas.addEventListener("pointerdown", event => {
@@ -299,7 +347,13 @@ VIEWS.push({
       event.preventDefault();
     });
     keepSharp(canvas, redraw);
-    app.on("state", update);
+    // a moved slider has its picture to come; what stands is drawn again where the settings or the names are others
+    let followed = "";
+    app.on("state", () => {
+      const now = JSON.stringify([settings(), app.state.layers.map(layer => layer.name)]);
+      if (now !== followed) update();
+      followed = now;
+    });
     app.on("theme", redraw);
     return {
       show(content, buffers) {

@@ -1,78 +1,10 @@
 // A ball as a polarisation camera sees it: radiance, behind a polariser that is turned, degree and angle of
-// polarisation. The Stokes vectors come in the camera's axes, the polarisers as vectors to multiply them with.
+// polarisation. The Stokes vectors come in the camera's axes, the polarisers as vectors to multiply them with. Painted
+// here and not by a shader, as fields over hemispheres are (graphics.js).
 
-const BALL = `#version 300 es
-precision highp float;
-in vec2 at;
-uniform sampler2D field, other, table;
-uniform vec4 analyser;
-uniform vec3 lamp;
-uniform vec2 range, handle, axis;
-uniform float azimuth, rim, gain, pixel;
-uniform int mode;
-uniform bool difference, handled;
-out vec4 colour;
-const float PI = 3.14159265, MARGIN = 1.02;
-// the polariser's disc stands in the lower right corner
-const vec3 DISC = vec3(0.85, -0.85, 0.15);
-
-// radiance and its shares Q, U, V at a place of the ball
-vec4 seen(sampler2D values, float zenith, float turn) {
-  vec2 size = vec2(textureSize(values, 0));
-  vec2 cell = vec2(turn / (2.0 * PI), min(zenith / rim, 1.0)) * (size - 1.0) + 0.5;
-  return texture(values, cell / size);
-}
-
-float shown(vec4 s) {
-  if (mode == 0) return s.x;
-  if (mode == 1) return s.x * dot(analyser, vec4(1.0, s.yzw));
-  if (mode == 2) return length(s.yz);
-  if (mode == 3) return 0.5 * atan(s.z, s.y);
-  return s.w;
-}
-
-vec3 toned(float radiance) {
-  float x = 1.0 - exp(-gain * radiance);
-  return vec3(x <= 0.0031308 ? 12.92 * x : 1.055 * pow(x, 1.0 / 2.4) - 0.055);
-}
-
-vec3 coloured(float value) {
-  return texture(table, vec2((value - range.x) / (range.y - range.x), 0.5)).rgb;
-}
-
-void main() {
-  vec2 w = (2.0 * at - 1.0) * MARGIN;
-  float radius = length(w);
-  float cover = clamp((1.0 - radius) / pixel + 0.5, 0.0, 1.0);
-  float zenith = asin(min(radius, 1.0)), turn = mod(atan(w.y, w.x) - azimuth, 2.0 * PI);
-  vec4 s = seen(field, zenith, turn);
-  float value = shown(s);
-  vec3 picture;
-  if (difference) {
-    vec4 t = seen(other, zenith, turn);
-    float step = value - shown(t);
-    if (mode == 3) step -= PI * round(step / PI);
-    picture = coloured(step);
-  } else if (mode < 2) picture = toned(value);
-  else if (mode == 3) picture = mix(vec3(0.5), coloured(value), smoothstep(0.0, 0.01, length(s.yz)));
-  else picture = coloured(value);
-  // the shadow's edge lies between the grid's points
-  float cosine = dot(lamp, vec3(w, sqrt(max(1.0 - radius * radius, 0.0))));
-  if (mode > 1) picture = mix(vec3(0.25), picture, clamp(cosine / pixel, 0.0, 1.0));
-  if (handled) {
-    float ring = abs(length(w - handle) - 0.06) / pixel;
-    picture = mix(vec3(ring < 1.2 ? 0.0 : 1.0), picture, smoothstep(2.0, 3.0, ring));
-  }
-  colour = vec4(picture * cover, cover);
-  vec2 p = w - DISC.xy;
-  if (mode == 1 && length(p) < DISC.z + pixel) {
-    float rim = 1.0 - clamp((DISC.z - 2.0 * pixel - length(p)) / pixel, 0.0, 1.0), edge = clamp((DISC.z - length(p)) / pixel, 0.0, 1.0);
-    // stripes along the axis that passes
-    float stripe = smoothstep(0.25, 0.4, abs(fract(dot(p, vec2(-axis.y, axis.x)) * 20.0 + 0.5) - 0.5));
-    colour = vec4(vec3(0.5), 1.0) * max(rim, 0.75 * stripe) * edge;
-  }
-}`;
-
+// This much of the square's half side, in radii, is shown around the ball's middle.
+const BALL_REACH = 1.02;
+// The polariser's disc in the lower right corner, in radii of the ball.
 const DISC = { x: 0.85, y: -0.85, radius: 0.15 };
 
 // What the modes of the picture are called, and the units of their numbers.
@@ -84,33 +16,98 @@ const BALL_MODES = {
   circular: { text: "V/I", title: "circular polarisation", unit: "%", scale: 100 },
 };
 
-// Greys of the tone curve over radiances up to this many times that of which it makes 1 − 1/e.
+// The tone curve, over radiances up to so many times that of which it makes 1 − 1/e.
 const TONES = 4;
-const greys = Uint8Array.from({ length: 1024 }, (_, i) => {
-  if (i % 4 === 3) return 255;
-  const x = 1 - Math.exp(-TONES * Math.floor(i / 4) / 255);
+function toned(share) {
+  const x = 1 - Math.exp(-TONES * share);
   return Math.round(255 * (x <= 0.0031308 ? 12.92 * x : 1.055 * x ** (1 / 2.4) - 0.055));
+}
+const greys = Uint8Array.from({ length: 1024 }, (_, i) => i % 4 === 3 ? 255 : toned((i >> 2) / 255));
+// In so many levels that the dark ones are a step of a byte.
+const greyLevels = Uint32Array.from({ length: 1 << 15 }, (_, i) => {
+  const grey = toned(i / ((1 << 15) - 1));
+  return new Uint32Array(Uint8Array.of(grey, grey, grey, 255).buffer)[0];
 });
+const GREY = { shadow: 64, unpolarised: 128 };
 
-// Four channels of a float16 field between its grid points, as the graphics card interpolates.
-function between(view, [rows, columns], row, column) {
-  const y = Math.min(Math.max(row, 0), rows - 1), x = Math.min(Math.max(column, 0), columns - 1);
-  const y0 = Math.floor(y), x0 = Math.floor(x), y1 = Math.min(y0 + 1, rows - 1), x1 = Math.min(x0 + 1, columns - 1);
-  const at = (j, i, c) => halfNumber(view.getUint16(2 * (4 * (j * columns + i) + c), true));
-  const mixed = (a, b, t) => a + (b - a) * t;
-  return [0, 1, 2, 3].map(c => mixed(mixed(at(y0, x0, c), at(y0, x1, c), x - x0), mixed(at(y1, x0, c), at(y1, x1, c), x - x0), y - y0));
+// Where each pixel of a square lies on the ball: row of the grid, part of a turn, place; for pictures of that size.
+const ballMaps = new Map();
+function ballMap(size, rows, rim) {
+  const key = [size, rows, rim].join();
+  if (ballMaps.has(key)) return ballMaps.get(key);
+  if (ballMaps.size > 3) ballMaps.clear();
+  const scale = 2 * BALL_REACH / size, most = size * size;
+  const map = { scale, pixel: new Uint32Array(most), row: new Float32Array(most), turn: new Float32Array(most),
+    x: new Float32Array(most), y: new Float32Array(most), z: new Float32Array(most), rim: [] };
+  let count = 0;
+  for (let j = 0; j < size; j++) for (let i = 0; i < size; i++) {
+    const x = (i + 0.5 - size / 2) * scale, y = (size / 2 - j - 0.5) * scale, radius = Math.hypot(x, y),
+      cover = (1 - radius) / scale + 0.5;
+    if (cover <= 0) continue;
+    const zenith = Math.asin(Math.min(radius, 1));
+    map.pixel[count] = j * size + i;
+    // the last row stands for what is beyond it
+    map.row[count] = Math.min(zenith / rim, 1 - 1e-6) * (rows - 1);
+    map.turn[count] = (Math.atan2(y, x) / (2 * Math.PI) + 1) % 1;
+    map.x[count] = x;
+    map.y[count] = y;
+    map.z[count] = Math.cos(zenith);
+    if (cover < 1) map.rim.push(count, Math.round(255 * cover));
+    count++;
+  }
+  for (const name of ["pixel", "row", "turn", "x", "y", "z"]) map[name] = map[name].slice(0, count);
+  ballMaps.set(key, map);
+  return map;
+}
+
+// Corner before each pixel and share of the way to the next column, with the lamp at an azimuth in degrees.
+function ballCorners(map, columns, azimuth) {
+  const { row, turn } = map, whole = columns - 1, shift = (azimuth / 360 % 1 + 1) % 1 * whole, count = row.length;
+  if (map.shift === shift && map.columns === columns) return;
+  map.corner ??= new Uint32Array(count);
+  map.along ??= new Float32Array(count);
+  for (let k = 0; k < count; k++) {
+    let c = turn[k] * whole - shift;
+    if (c < 0) c += whole;
+    const c0 = Math.min(c | 0, whole - 1);
+    map.corner[k] = (row[k] | 0) * columns + c0;
+    map.along[k] = c - c0;
+  }
+  map.shift = shift;
+  map.columns = columns;
+}
+
+// A number between four corners of a grid, `step` numbers a point.
+function blended(values, corner, columns, wr, wc, step = 1, offset = 0) {
+  const at = corner * step + offset, below = at + columns * step;
+  const upper = values[at] + (values[at + step] - values[at]) * wc,
+    lower = values[below] + (values[below + step] - values[below]) * wc;
+  return upper + (lower - upper) * wr;
+}
+
+// float16 numbers from their bits.
+function halfFloats(bits) {
+  const numbers = allHalfNumbers(), values = new Float32Array(bits.length);
+  for (let k = 0; k < bits.length; k++) values[k] = numbers[bits[k]];
+  return values;
+}
+
+// A pixel's colour on the way to a grey.
+function towardsGrey(colour, grey, share) {
+  const mixed = shift => Math.round((colour >> shift & 255) * (1 - share) + grey * share) << shift;
+  return (0xff000000 | mixed(16) | mixed(8) | mixed(0)) >>> 0;
 }
 
 VIEWS.push({
   name: "sphere",
   title: "Lit ball",
   build(place, app) {
-    const canvas = element("canvas", { width: 450, height: 450, class: "ball", role: "img", "aria-label": "A lit ball as a polarisation camera sees it" });
-    const graphics = new Graphics(canvas, BALL);
-    graphics.gl.enable(graphics.gl.BLEND);
-    graphics.gl.blendFunc(graphics.gl.ONE, graphics.gl.ZERO);
-    const tables = Object.fromEntries(Object.entries(app.catalogue.colours).map(([name, text]) => [name, decoded(text)]));
-    let header = null, fields = [], polarisers = null, handled = false, table = "";
+    const canvas = element("canvas", { width: 450, height: 450, class: "ball", role: "img",
+      "aria-label": "A lit ball as a polarisation camera sees it" });
+    const pen = canvas.getContext("2d");
+    const tables = Object.fromEntries(Object.entries(app.catalogue.colours).map(([name, text]) =>
+      [name, decoded(text)]));
+    let header = null, fields = [], polarisers = null, handled = false, image = null;
 
     const settings = () => ({ mode: "radiance", polariser: 0, exposure: 0, ...app.state?.settings.sphere });
     const lamp = () => {
@@ -125,21 +122,29 @@ VIEWS.push({
     const light = (values, dragging) => set({ light: { ...lamp(), ...values } }, dragging, ["sphere"]);
 
     const slider = (name, symbol, about, unit, lower, upper, set) => {
-      const row = sliderRow({ name: `sphere-${name}`, symbol, about, unit, lower, upper, least: lower, most: upper }, set);
+      const row = sliderRow({ name: `sphere-${name}`, symbol, about, unit, lower, upper, least: lower, most: upper },
+        set);
       row.node.dataset.place = `settings.sphere.${name}`;
       return row;
     };
-    const mode = choiceRow("What the ball shows", Object.entries(BALL_MODES).map(([value, { text, title }]) => ({ value, text, title })), value => show("mode", value));
-    const dial = slider("polariser", "α", "polariser, from level", "°", 0, 180, (value, dragging) => show("polariser", value, dragging));
-    const exposure = slider("exposure", "EV", "exposure", "stops", -8, 8, (value, dragging) => show("exposure", value, dragging));
-    const polar = slider("light.polar", "θ", "lamp, from the camera", "°", 0, 180, (value, dragging) => light({ polar: value }, dragging));
-    const azimuth = slider("light.azimuth", "ψ", "lamp, around the ball from the right", "°", 0, 360, (value, dragging) => light({ azimuth: value }, dragging));
+    const mode = choiceRow("What the ball shows", Object.entries(BALL_MODES).map(([value, { text, title }]) =>
+      ({ value, text, title })), value => show("mode", value));
+    const dial = slider("polariser", "α", "polariser, from level", "°", 0, 180, (value, dragging) =>
+      show("polariser", value, dragging));
+    const exposure = slider("exposure", "EV", "exposure", "stops", -8, 8, (value, dragging) =>
+      show("exposure", value, dragging));
+    const polar = slider("light.polar", "θ", "lamp, from the camera", "°", 0, 180, (value, dragging) =>
+      light({ polar: value }, dragging));
+    const azimuth = slider("light.azimuth", "ψ", "lamp, around the ball from the right", "°", 0, 360,
+      (value, dragging) => light({ azimuth: value }, dragging));
     const legend = new ColourLegend();
     const readout = element("p", { class: "read" });
     place.append(
       mode.node, canvas, legend.node, readout, dial.node, exposure.node,
-      element("details", { class: "elements" }, element("summary", {}, "Lamp: drag on the ball, or here"), polar.node, azimuth.node,
-        element("p", { class: "about" }, "Angles of polarisation are those of the picture: 0° is level, counterclockwise. Of polarised light p lies in the plane of lamp and camera.")),
+      element("details", { class: "elements" }, element("summary", {}, "Lamp: drag on the ball, or here"), polar.node,
+        azimuth.node,
+        element("p", { class: "about" }, "Angles of polarisation are those of the picture: 0° is level, ",
+          "counterclockwise. Of polarised light p lies in the plane of lamp and camera.")),
     );
 
     function range() {
@@ -149,32 +154,113 @@ VIEWS.push({
       return both || mode === "circular" ? [-most, most] : [0, most];
     }
 
+    // What the colours stand for, at the grid's points; not for angles.
+    function scalars(values, { mode, polariser }) {
+      const count = values.length / 4, found = new Float32Array(count);
+      // the dial stands between two of the polarisers at most by rounding
+      const at = 4 * Math.round(polariser % 180 / 180 * (polarisers.length / 4 - 1)),
+        [a, b, c, d] = polarisers.subarray(at, at + 4);
+      for (let k = 0; k < count; k++) {
+        const L = values[4 * k], q = values[4 * k + 1], u = values[4 * k + 2], v = values[4 * k + 3];
+        if (mode === "radiance") found[k] = L;
+        else if (mode === "polariser") found[k] = L * (a + b * q + c * u + d * v);
+        else found[k] = mode === "dolp" ? Math.sqrt(q * q + u * u) : v;
+      }
+      return found;
+    }
+
     function redraw() {
       if (!header) return;
       const chosen = settings(), both = fields.length > 1, known = BALL_MODES[chosen.mode];
       if (!known) return;
-      const gain = Math.PI * 2 ** chosen.exposure;
-      const gl = graphics.gl, index = Object.keys(BALL_MODES).indexOf(chosen.mode);
-      const wanted = both || chosen.mode === "circular" ? "signed" : chosen.mode === "aolp" ? "cyclic" : "sequential";
-      if (table !== wanted) { graphics.colours("table", tables[wanted]); table = wanted; }
-      // the dial stands between two of the polarisers at most by rounding
-      const step = Math.round(chosen.polariser % 180 / 180 * (polarisers.length / 4 - 1));
-      graphics.vector("analyser", polarisers.subarray(4 * step, 4 * step + 4));
-      graphics.integer("mode", index);
-      graphics.integer("difference", both ? 1 : 0);
-      graphics.integer("handled", handled ? 1 : 0);
-      graphics.vector("range", range());
-      graphics.vector("lamp", header.towards_lamp);
-      graphics.vector("axis", [Math.cos(chosen.polariser * Math.PI / 180), Math.sin(chosen.polariser * Math.PI / 180)]);
-      graphics.number("rim", header.rim);
-      graphics.number("gain", gain);
-      graphics.number("azimuth", header.lamp[1] * Math.PI / 180);
-      graphics.number("pixel", 2.04 / canvas.width);
-      graphics.vector("handle", highlight());
-      gl.viewport(0, 0, canvas.width, canvas.height);
-      gl.drawArrays(gl.TRIANGLES, 0, 3);
-      const tone = !both && index < 2, ends = tone ? [0, TONES / gain] : range().map(v => v * known.scale);
-      legend.show(tone ? greys : tables[wanted], ends, known.unit, both ? `${known.text}: ${header.models[0]} − ${header.models[1]}` : known.title);
+      const [rows, columns] = header.shape, size = canvas.width, map = ballMap(size, rows, header.rim);
+      const tone = !both && ["radiance", "polariser"].includes(chosen.mode), gain = Math.PI * 2 ** chosen.exposure;
+      const name = chosen.mode === "aolp" ? "cyclic" : both || chosen.mode === "circular" ? "signed" : "sequential";
+      const table = tone ? greyLevels : levelTable(app.catalogue.colours[name]);
+      const [low, high] = tone ? [0, TONES / gain] : range(), last = table.length - 1, scale = last / (high - low);
+      if (image?.width !== size) image = pen.createImageData(size, size);
+      const pixels = new Uint32Array(image.data.buffer), { pixel } = map;
+      ballCorners(map, columns, header.lamp[1]);
+      const { corner, along, row } = map, count = pixel.length;
+      if (chosen.mode === "aolp") {
+        // axes have no jump where their angles have one: what turns with twice the angle is blended
+        const [values, others] = fields;
+        for (let k = 0; k < count; k++) {
+          const wr = row[k] - (row[k] | 0), wc = along[k];
+          let q = blended(values, corner[k], columns, wr, wc, 4, 1),
+            u = blended(values, corner[k], columns, wr, wc, 4, 2), dolp = Math.sqrt(q * q + u * u);
+          if (both) {
+            const p = blended(others, corner[k], columns, wr, wc, 4, 1),
+              v = blended(others, corner[k], columns, wr, wc, 4, 2);
+            dolp = Math.min(dolp, Math.sqrt(p * p + v * v));
+            [q, u] = [q * p + u * v, u * p - q * v];
+          }
+          const fade = Math.min(dolp / 0.01, 1), colour = table[(0.5 * Math.atan2(u, q) - low) * scale + 0.5 | 0];
+          const grey = 1 - fade * fade * (3 - 2 * fade);
+          pixels[pixel[k]] = fade < 1 ? towardsGrey(colour, GREY.unpolarised, grey) : colour;
+        }
+      } else {
+        const shown = scalars(fields[0], chosen);
+        if (both) {
+          const other = scalars(fields[1], chosen);
+          for (let k = 0; k < shown.length; k++) shown[k] -= other[k];
+        }
+        for (let k = 0; k < shown.length; k++) shown[k] = (shown[k] - low) * scale + 0.5;
+        for (let k = 0; k < count; k++) {
+          const at = corner[k], below = at + columns, wc = along[k], r = row[k],
+            upper = shown[at] + (shown[at + 1] - shown[at]) * wc;
+          const level = upper + (shown[below] + (shown[below + 1] - shown[below]) * wc - upper) * (r - (r | 0)) | 0;
+          pixels[pixel[k]] = table[level < 0 ? 0 : level > last ? last : level];
+        }
+      }
+      if (!["radiance", "polariser"].includes(chosen.mode)) {
+        // the shadow's edge lies between the grid's points
+        const [x, y, z] = header.towards_lamp;
+        for (let k = 0; k < pixel.length; k++) {
+          const lit = (x * map.x[k] + y * map.y[k] + z * map.z[k]) / map.scale;
+          if (lit < 1) pixels[pixel[k]] = towardsGrey(pixels[pixel[k]], GREY.shadow, lit > 0 ? 1 - lit : 1);
+        }
+      }
+      for (let k = 0; k < map.rim.length; k += 2) image.data[4 * pixel[map.rim[k]] + 3] = map.rim[k + 1];
+      pen.putImageData(image, 0, 0);
+      if (chosen.mode === "polariser") drawDisc(chosen.polariser);
+      if (handled) drawHandle();
+      legend.show(tone ? greys : tables[name], [low * known.scale, high * known.scale], known.unit,
+        both ? `${known.text}: ${header.models[0]} − ${header.models[1]}` : known.title);
+    }
+
+    // From places in radii to the canvas.
+    const placed = (x, y) => [(x / BALL_REACH + 1) * canvas.width / 2, (1 - y / BALL_REACH) * canvas.width / 2];
+
+    // The polariser, with stripes along the axis that passes.
+    function drawDisc(angle) {
+      const [x, y] = placed(DISC.x, DISC.y), radius = DISC.radius * canvas.width / 2 / BALL_REACH,
+        ratio = canvas.width / Math.max(canvas.clientWidth, 1);
+      pen.save();
+      pen.translate(x, y);
+      pen.rotate(-angle * Math.PI / 180);
+      pen.strokeStyle = "#808080";
+      pen.lineWidth = 1.5 * ratio;
+      pen.beginPath();
+      pen.arc(0, 0, radius, 0, 2 * Math.PI);
+      pen.stroke();
+      pen.clip();
+      pen.lineWidth = radius / 7;
+      pen.beginPath();
+      for (let k = -3; k <= 3; k++) { pen.moveTo(-radius, k * radius / 3.5); pen.lineTo(radius, k * radius / 3.5); }
+      pen.stroke();
+      pen.restore();
+    }
+
+    function drawHandle() {
+      const [x, y] = placed(...highlight()), ratio = canvas.width / Math.max(canvas.clientWidth, 1);
+      for (const [width, ink] of [[4, "#fff"], [2, "#000"]]) {
+        pen.lineWidth = width * ratio;
+        pen.strokeStyle = ink;
+        pen.beginPath();
+        pen.arc(x, y, 12 * ratio, 0, 2 * Math.PI);
+        pen.stroke();
+      }
     }
 
     // where the ball mirrors the lamp, from its middle in radii
@@ -188,26 +274,33 @@ VIEWS.push({
       mode.show(chosen.mode);
       dial.node.hidden = chosen.mode !== "polariser";
       exposure.node.hidden = fields.length > 1 || !["radiance", "polariser"].includes(chosen.mode);
-      for (const [row, value] of [[dial, chosen.polariser], [exposure, chosen.exposure], [polar, p], [azimuth, a]]) row.show(value);
+      dial.show(chosen.polariser);
+      exposure.show(chosen.exposure);
+      polar.show(p);
+      azimuth.show(a);
       redraw();
     }
 
     const pointed = event => {
       const box = canvas.getBoundingClientRect();
-      return [(2 * (event.clientX - box.left) / box.width - 1) * 1.02, (1 - 2 * (event.clientY - box.top) / box.height) * 1.02];
+      return [(2 * (event.clientX - box.left) / box.width - 1) * BALL_REACH,
+        (1 - 2 * (event.clientY - box.top) / box.height) * BALL_REACH];
     };
 
     function read(event) {
       const [x, y] = pointed(event), radius = Math.hypot(x, y);
       if (!header || radius > 1) { readout.textContent = "\u00a0"; return; }
-      const turn = (Math.atan2(y, x) - header.lamp[1] * Math.PI / 180 + 4 * Math.PI) % (2 * Math.PI);
-      const [rows, columns] = header.shape;
-      readout.textContent = fields.map((field, i) => {
-        const [L, q, u, v] = between(field, header.shape, Math.asin(radius) / header.rim * (rows - 1), turn / (2 * Math.PI) * (columns - 1));
+      const turn = (Math.atan2(y, x) / (2 * Math.PI) - header.lamp[1] / 360 + 3) % 1, [rows, columns] = header.shape;
+      const row = Math.min(Math.asin(radius) / header.rim, 1 - 1e-6) * (rows - 1), r0 = row | 0,
+        column = turn * (columns - 1), c0 = Math.min(column | 0, columns - 2);
+      readout.textContent = fields.map((values, i) => {
+        const [L, q, u, v] = [0, 1, 2, 3].map(offset =>
+          blended(values, r0 * columns + c0, columns, row - r0, column - c0, 4, offset));
         const angle = Math.atan2(u, q) / 2 * 180 / Math.PI;
         const name = fields.length > 1 ? `${header.models[i]}: ` : "";
         if (L <= 0) return `${name}in the shadow`;
-        return `${name}${written(L)} sr⁻¹, DoLP ${written(100 * Math.hypot(q, u))} %, AoLP ${written(Number(angle.toFixed(1)))}°, V/I ${written(100 * v)} %`;
+        const dolp = written(100 * Math.hypot(q, u)), aolp = written(Number(angle.toFixed(1)));
+        return `${name}${written(L)} sr⁻¹, DoLP ${dolp} %, AoLP ${aolp}°, V/I ${written(100 * v)} %`;
       }).join("; ");
     }
 
@@ -239,24 +332,28 @@ VIEWS.push({
       grip.moved ||= Math.hypot(event.clientX - grip.x, event.clientY - grip.y) > 4;
       if (!grip.moved) return;
       const [x, y] = pointed(event);
-      const polar = 2 * Math.asin(Math.min(Math.hypot(x, y), 1)) * 180 / Math.PI, around = Math.atan2(y, x) * 180 / Math.PI;
+      const polar = 2 * Math.asin(Math.min(Math.hypot(x, y), 1)) * 180 / Math.PI,
+        around = Math.atan2(y, x) * 180 / Math.PI;
       light({ polar: Number(polar.toFixed(1)), azimuth: Number(((around + 360) % 360).toFixed(1)) }, true);
     });
     canvas.addEventListener("pointerup", drop);
     canvas.addEventListener("pointercancel", drop);
     canvas.addEventListener("pointerleave", event => { if (!grip) { readout.textContent = "\u00a0"; drop(event); } });
     readout.textContent = "\u00a0";
-    keepSharp(canvas, redraw);
-    app.on("state", update);
+    keepSharp(canvas, redraw, 1200);
+    // a moved slider has its picture to come; what stands is drawn again where the ball's settings are others
+    let followed = "";
+    app.on("state", () => {
+      const now = JSON.stringify(settings());
+      if (now !== followed) update();
+      followed = now;
+    });
     return {
       show(content, buffers) {
         header = content;
-        fields = buffers.slice(0, -1);
-        readout.classList.toggle("two", fields.length > 1);
-        const last = buffers.at(-1);
-        polarisers = new Float32Array(last.buffer.slice(last.byteOffset, last.byteOffset + last.byteLength));
-        graphics.field("field", fields[0], ...header.shape);
-        graphics.field("other", fields.at(-1), ...header.shape);
+        const copied = buffer => buffer.buffer.slice(buffer.byteOffset, buffer.byteOffset + buffer.byteLength);
+        fields = buffers.slice(0, -1).map(buffer => halfFloats(new Uint16Array(copied(buffer))));
+        polarisers = new Float32Array(copied(buffers.at(-1)));
         update();
       },
     };
