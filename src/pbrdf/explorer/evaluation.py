@@ -277,7 +277,7 @@ def described(picture: Picture, difference: bool) -> dict[str, Any]:
     title = _LABELS[picture.quantity]
     symbol = title.split(",")[0]
     if difference:
-        title = f"log₁₀ of the ratio of {symbol}" if logarithmic else f"Difference of {title}"
+        title = f"Δ log₁₀ {symbol}" if logarithmic else f"Δ {title}"
     return {
         "quantity": picture.quantity,
         "symbol": symbol.split("/m")[0],
