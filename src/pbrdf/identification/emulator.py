@@ -1,34 +1,36 @@
-"""What specimens of materials reflect at geometries that many pixels share, from tables of second order.
+"""What specimens of materials reflect at geometries that many pixels share, from tables of polynomials.
 
 Along the unknown in which the signal bends most, nodes lie half a standard deviation of the scatter apart, up to four
 from the mean; there the other unknowns have the values most likely with it. About each node the signal is a polynomial
-of second order of all unknowns, with the exact value and derivatives at the node and second derivatives by central
-differences of exact first ones; terms of second order that say less than what is left out anyway are dropped. What is
-left is of third order in a quarter of a standard deviation of the unknown that bends most, and of the scatter of the
-others: :attr:`Emulator.error` is what it comes to for random specimens.
+of all unknowns, with the exact value and derivatives at the node and second derivatives by central
+differences of exact first ones. What is left for random specimens is fitted by terms up to third order, the same at all
+nodes; terms that hardly change the signal are dropped. :attr:`Emulator.error` is what other random
+specimens miss by.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations_with_replacement
 
 import numpy as np
 
+from pbrdf.backend import get_backend
 from pbrdf.identification.material import Material
 from pbrdf.inversion.observations import Observations
-from pbrdf.inversion.problem import derivatives
+from pbrdf.inversion.problem import Space, derivatives, signals_of
 
-__all__ = ["Emulator", "emulators_of"]
+__all__ = ["Emulator", "emulators_of", "shown"]
 
 #: How far from the mean the nodes reach, and how far apart they are, in standard deviations of the scatter.
 REACH, SPACING = 4.0, 0.5
 #: Steps of the second derivatives along the unknown of the nodes and the others, in the same unit.
 ALONG, ACROSS = 0.35, 1.0
-#: Specimens that tell the error.
-DRAWS = 48
-#: A term of second order is dropped whose square is less than this part of the squared error without dropping any.
-DROPPED = 0.1
+#: Specimens that tell the error, and for each term of third order those that tell what it is.
+DRAWS, FOR_A_TERM = 48, 4
+#: A term is dropped that is less than this part of the signal, as root mean square over specimens and data.
+DROPPED = 3e-4
 #: Sets of unknowns of a kernel: what it brings back is bounded.
 BATCH = 1 << 12
 
@@ -45,8 +47,8 @@ class Emulator:
         Number of the unknown along which the nodes lie.
     nodes
         Unknowns at the nodes, shape (K, P).
-    pairs
-        Numbers of the unknowns whose products are terms, shape (Q − 1 − P, 2).
+    products
+        Numbers of the unknowns whose products are terms, two or three each; Q − 1 − P of them.
     table
         Value, first derivatives and coefficients of the products at the nodes, shape (K, Q, D).
     error
@@ -56,7 +58,7 @@ class Emulator:
     material: Material
     axis: int
     nodes: np.ndarray
-    pairs: np.ndarray
+    products: tuple[tuple[int, ...], ...]
     table: np.ndarray
     error: np.ndarray
 
@@ -75,12 +77,16 @@ class Emulator:
     def terms(self, unknowns: np.ndarray, node: np.ndarray | int) -> np.ndarray:
         """What the table is multiplied by, shapes (S, P) and (S,) to (Q, S)."""
         step = (unknowns - self.nodes[node]).T
-        first, second = self.pairs.T
-        return np.concatenate([np.ones((1, step.shape[1])), step, step[first] * step[second]])
+        products = [step[list(of)].prod(axis=0) for of in self.products]
+        return np.stack([np.ones(step.shape[1]), *step, *products])
+
+    def nearest(self, unknowns: np.ndarray) -> np.ndarray:
+        """Numbers of the nodes that specimens belong to, shapes (S, P) to (S,)."""
+        return np.clip(np.rint(self.position(unknowns)), 0, len(self.nodes) - 1).astype(int)
 
     def values(self, unknowns: np.ndarray) -> np.ndarray:
         """Signals of specimens, shapes (S, P) to (S, D)."""
-        number = np.clip(np.rint(self.position(unknowns)), 0, len(self.nodes) - 1).astype(int)
+        number = self.nearest(unknowns)
         result = np.empty((len(unknowns), self.table.shape[2]))
         for k in np.unique(number):
             own = number == k
@@ -98,36 +104,62 @@ def emulators_of(materials: Sequence[Material], data: Observations) -> tuple[Emu
     data
         Geometries, channels and illumination.
     """
-    whole = [_expanded(material, data) for material in materials]
-    drawn = [_drawn(material) for material in materials]
-    exact = [
-        np.moveaxis(_signal(m, u, data)[0], -1, 1).reshape(DRAWS, -1)
-        for m, u in zip(materials, drawn, strict=True)
+    size = len(materials[0].mean)
+    cubes = tuple(combinations_with_replacement(range(size), 3))
+    draws = DRAWS + FOR_A_TERM * (len(cubes) + size * (size + 1) // 2 + size + 1)
+    normal = np.random.default_rng(0).standard_normal((draws, size))
+    drawn = [np.clip(m.mean + normal @ m.root.T, *m.space.box) for m in materials]
+    exact = shown(materials[0].space, np.concatenate(drawn).T, data).T.reshape(len(drawn), draws, -1)
+    whole = [
+        _fitted(_expanded(material, data), cubes, unknowns[DRAWS:], signal[DRAWS:])
+        for material, unknowns, signal in zip(materials, drawn, exact, strict=True)
     ]
-    pairs = whole[0].pairs
-    needed = np.zeros(len(pairs), dtype=bool)
+    products = whole[0].products
+    needed = np.zeros(len(products), dtype=bool)
     for emulator, unknowns, signal in zip(whole, drawn, exact, strict=True):
         unit = np.linalg.norm(signal.mean(axis=0).reshape(len(data.channels), -1), axis=0)
         weight = np.tile(1.0 / np.maximum(unit, 1e-12 * unit.max()) ** 2, len(data.channels))
-        missed = (((emulator.values(unknowns) - signal) ** 2) @ weight).mean()
-        says = np.zeros(len(pairs))
-        number = np.clip(np.rint(emulator.position(unknowns)), 0, len(emulator.nodes) - 1).astype(int)
-        powers = emulator.terms(unknowns, number)[-len(pairs) :]
-        for power, k in zip(powers.T, number, strict=True):
-            says += power**2 * (emulator.table[k, -len(pairs) :] ** 2 @ weight) / DRAWS
-        needed |= says > DROPPED * missed
-    columns = np.concatenate([np.ones(len(whole[0].nodes[0]) + 1, dtype=bool), needed])
-    kept = [replace(e, pairs=pairs[needed], table=np.ascontiguousarray(e.table[:, columns])) for e in whole]
+        number = emulator.nearest(unknowns[:DRAWS])
+        powers = emulator.terms(unknowns[:DRAWS], number)[-len(products) :]
+        coefficients = emulator.table[number, -len(products) :] ** 2 @ weight / len(weight)
+        needed |= (powers.T**2 * coefficients).mean(axis=0) > DROPPED**2
+    columns = np.concatenate([np.ones(1 + size, dtype=bool), needed])
+    kept = tuple(of for of, own in zip(products, needed, strict=True) if own)
+    smaller = [replace(e, products=kept, table=np.ascontiguousarray(e.table[:, columns])) for e in whole]
     return tuple(
-        replace(e, error=np.sqrt(((e.values(u) - s) ** 2).mean(axis=0)))
-        for e, u, s in zip(kept, drawn, exact, strict=True)
+        replace(e, error=np.sqrt(((e.values(u[:DRAWS]) - s[:DRAWS]) ** 2).mean(axis=0)))
+        for e, u, s in zip(smaller, drawn, exact, strict=True)
     )
 
 
-def _drawn(material: Material) -> np.ndarray:
-    """Unknowns of random specimens, shape (DRAWS, P)."""
-    normal = np.random.default_rng(0).standard_normal((DRAWS, len(material.mean)))
-    return np.clip(material.mean + normal @ material.root.T, *material.space.box)
+def shown(space: Space, unknowns: np.ndarray, data: Observations) -> np.ndarray:
+    """What the model shows of L specimens at the geometries of a data set, shapes (P, L) to (D, L)."""
+    import drjit as dr
+
+    backend = get_backend()
+    Float, UInt32 = backend.Float, backend.UInt32
+    count, points = unknowns.shape[1], len(data.theta_i)
+    columns = [backend.upload(Float, row) for row in unknowns]
+    size = dr.opaque(UInt32, count)
+    lane = dr.arange(UInt32, points * count)
+    point = lane // size
+    u = [dr.gather(Float, column, lane - point * size) for column in columns]
+    values, _ = signals_of(space, [data])(u, UInt32(0), point, data.channels)
+    arrays = [Float(value) + dr.zeros(Float, points * count) for value in values]
+    dr.eval(arrays)
+    return np.concatenate([array.numpy() for array in arrays]).reshape(-1, count)
+
+
+def _fitted(
+    emulator: Emulator, cubes: Sequence[tuple[int, ...]], unknowns: np.ndarray, signal: np.ndarray
+) -> Emulator:
+    """With terms of third order, which and the others take up what random specimens miss."""
+    table = np.pad(emulator.table, ((0, 0), (0, len(cubes)), (0, 0)))
+    result = replace(emulator, products=(*emulator.products, *cubes), table=table)
+    terms = result.terms(unknowns, emulator.nearest(unknowns)).T
+    unit = np.maximum(np.linalg.norm(terms, axis=0), 1e-300)
+    found = np.linalg.lstsq(terms / unit, signal - emulator.values(unknowns), rcond=1e-6)[0]
+    return replace(result, table=table + found / unit[:, None])
 
 
 def _expanded(material: Material, data: Observations) -> Emulator:
@@ -166,7 +198,8 @@ def _expanded(material: Material, data: Observations) -> Emulator:
     factor = np.where(rows == columns, 0.5, 1.0)
     table = np.concatenate([values[:, 0, ..., None], slopes[:, 0], factor * second[..., rows, columns]], axis=-1)
     table = table.transpose(0, 3, 2, 1).reshape(len(nodes), table.shape[-1], -1)
-    return Emulator(material, axis, nodes, np.stack([rows, columns], axis=1), table, np.empty(0))
+    products = tuple((int(i), int(j)) for i, j in zip(rows, columns, strict=True))
+    return Emulator(material, axis, nodes, products, table, np.empty(0))
 
 
 def _signal(material: Material, unknowns: np.ndarray, data: Observations) -> tuple[np.ndarray, np.ndarray]:

@@ -78,8 +78,7 @@ class Tables:
         self.parts: list[Any] = [slice(None)]
         if scaled is not None and not scaled.all():
             self.parts = [np.flatnonzero(scaled), np.flatnonzero(~scaled)]
-        #: Numbers of the unknowns of each product.
-        self.pairs = [(int(i), int(j)) for i, j in first.pairs]
+        self.products = first.products
         self.centres = backend.upload(Float, np.concatenate([e.nodes.ravel() for e in emulators]))
         described = np.array([_described(e) for e in emulators])
         self.described, self.width = backend.upload(Float, described.ravel()), described.shape[1]
@@ -348,14 +347,14 @@ class _Evaluation:
 
         tables, size, terms = self.tables, self.tables.size, self.tables.terms
         Float = type(z[0])
-        p = [Float(1.0), *step, *(step[i] * step[j] for i, j in tables.pairs)]
+        p = [Float(1.0), *step, *(_product([step[i] for i in of]) for of in tables.products)]
         # derivatives of the terms: those of each unknown that are not 0, by their numbers
         slopes: list[dict[int, Any]] = [{1 + i: Float(1.0)} for i in range(size)]
-        for q, (i, j) in enumerate(tables.pairs, 1 + size):
-            if i == j:
-                slopes[i][q] = 2.0 * step[i]
-            else:
-                slopes[i][q], slopes[j][q] = step[j], step[i]
+        for q, of in enumerate(tables.products, 1 + size):
+            for i in dict.fromkeys(of):
+                rest = list(of)
+                rest.remove(i)
+                slopes[i][q] = float(of.count(i)) * _product([step[j] for j in rest])
         cost: Any = self.squares
         g: list[Any] = [Float(0.0) for _ in range(width)]
         A: dict[Any, Any] = {(i, j): Float(0.0) for i in range(width) for j in range(i + 1)}
@@ -418,6 +417,13 @@ def _inner(a: Sequence[Any], b: Sequence[Any]) -> Any:
     for x, y in zip(a[1:], b[1:], strict=True):
         total = dr.fma(x, y, total)
     return total
+
+
+def _product(factors: Sequence[Any]) -> Any:
+    product = factors[0]
+    for factor in factors[1:]:
+        product = product * factor
+    return product
 
 
 def _total(terms: Sequence[Any]) -> Any:

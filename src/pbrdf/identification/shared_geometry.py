@@ -12,22 +12,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 from scipy.special import gammainccinv
 
-from pbrdf.backend import get_backend
 from pbrdf.data.schema import is_ratio
-from pbrdf.identification.emulator import Emulator, emulators_of
+from pbrdf.identification.emulator import Emulator, emulators_of, shown
 from pbrdf.identification.evidence import GAIN_SPREAD
 from pbrdf.identification.material import Material
 from pbrdf.identification.quadratic_modes import Tables
 from pbrdf.identification.screen import DATA, Screen
 from pbrdf.inversion.observations import Observations
-from pbrdf.inversion.problem import signals_of
-from pbrdf.inversion.stack import Stack
 
 __all__ = ["SharedGeometry"]
 
@@ -150,13 +146,12 @@ class SharedGeometry:
                 left = left[moved & (far[left] < worth[left])]
                 if not left.size:
                     break
-            # the error is of third order in how far the specimen is from its mean
+            # the squared error of a specimen twice as far from its mean is 64 times as large, or more
             farther = np.maximum((z[: tables.size] ** 2).mean(axis=0), 1.0) ** 3
             missed = farther * pixels.missed[of, pixel]
-            nearest = np.sqrt(np.maximum(far, 0.0)) - np.sqrt(missed)
             within = running[of, pixel]
             tolerated = TOLERATED * np.sqrt(2.0 * np.maximum(freedom[pixel], 1))
-            left = np.flatnonzero((missed > tolerated) & (nearest < np.sqrt(within)))
+            left = np.flatnonzero((missed > tolerated) & (far < within))
             for _ in range(STEPS):
                 if not left.size:
                     break
@@ -219,34 +214,16 @@ class SharedGeometry:
             at = order[begin : begin + TOGETHER]
             own, begun, seen_by = (kind[at], node[at]), start[:, at], pixel[at]
             centre = None if pixels.centre is None else pixels.centre[seen_by]
-            offset = self._shown(tables, own[0], begun) - tables.values(*own, begun) if exact else None
+            offset = None
+            if exact:
+                space = tables.emulators[0].material.space
+                modelled = shown(space, tables.unknowns(own[0], begun), self.like)
+                offset = modelled - tables.values(*own, begun)
             sums = tables.moments(*own, seen_by, pixels.weights, pixels.weighted, pixels.squares, offset)
             cost, half_log, mode, promised[at] = tables.modes(sums, *own, begun, centre)
             log_evidence[at], z[:, at] = -cost - half_log, mode
             distance[at] = 2.0 * cost - (mode[tables.size] ** 2 if self.gain else 0.0)
         return log_evidence, distance, z, promised
-
-    def _shown(self, tables: Tables, kind: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """What the model itself shows of L specimens, shape (D, L)."""
-        import drjit as dr
-
-        backend = get_backend()
-        Float, UInt32 = backend.Float, backend.UInt32
-        count, points = z.shape[1], len(self.like.theta_i)
-        unknowns = [backend.upload(Float, row) for row in tables.unknowns(kind, z)]
-        size = dr.opaque(UInt32, count)
-        lane = dr.arange(UInt32, points * count)
-        point = lane // size
-        u = [dr.gather(Float, row, lane - point * size) for row in unknowns]
-        channels = self.like.channels
-        values, _ = signals_of(tables.emulators[0].material.space, self._like)(u, UInt32(0), point, channels)
-        arrays = [Float(value) + dr.zeros(Float, points * count) for value in values]
-        dr.eval(arrays)
-        return np.concatenate([array.numpy() for array in arrays]).reshape(-1, count)
-
-    @cached_property
-    def _like(self) -> Stack:
-        return Stack.of([self.like])
 
 
 @dataclass(frozen=True, eq=False)
