@@ -119,8 +119,8 @@ def emulators_of(materials: Sequence[Material], data: Observations) -> tuple[Emu
     for emulator, unknowns, signal in zip(whole, drawn, exact, strict=True):
         unit = np.linalg.norm(signal.mean(axis=0).reshape(len(data.channels), -1), axis=0)
         weight = np.tile(1.0 / np.maximum(unit, 1e-12 * unit.max()) ** 2, len(data.channels))
-        number = emulator.nearest(unknowns[:DRAWS])
-        powers = emulator.terms(unknowns[:DRAWS], number)[-len(products) :]
+        number = emulator.nearest(unknowns[DRAWS:])
+        powers = emulator.terms(unknowns[DRAWS:], number)[-len(products) :]
         coefficients = emulator.table[number, -len(products) :] ** 2 @ weight / len(weight)
         needed |= (powers.T**2 * coefficients).mean(axis=0) > DROPPED**2
     columns = np.concatenate([np.ones(1 + size, dtype=bool), needed])
@@ -196,7 +196,9 @@ def _expanded(material: Material, data: Observations) -> Emulator:
     second = 0.5 * (second + np.swapaxes(second, -1, -2))
     rows, columns = np.tril_indices(size)
     factor = np.where(rows == columns, 0.5, 1.0)
-    table = np.concatenate([values[:, 0, ..., None], slopes[:, 0], factor * second[..., rows, columns]], axis=-1)
+    table = np.concatenate(
+        [values[:, 0, ..., None], slopes[:, 0], factor * second[..., rows, columns]], axis=-1
+    )
     table = table.transpose(0, 3, 2, 1).reshape(len(nodes), table.shape[-1], -1)
     products = tuple((int(i), int(j)) for i, j in zip(rows, columns, strict=True))
     return Emulator(material, axis, nodes, products, table, np.empty(0))

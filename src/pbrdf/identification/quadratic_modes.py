@@ -17,6 +17,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -149,7 +150,7 @@ class Tables:
         first = np.arange(self.terms) * (np.arange(self.terms) + 1) // 2
         for begin, end in _runs(kind, node):
             own = pixel[begin:end]
-            w, wy = weights[:, own], weighted[:, own]
+            w, wy = weights.take(own, axis=1), weighted.take(own, axis=1)
             products = self._products(int(kind[begin]), int(node[begin]))
             table = self.emulators[kind[begin]].table[node[begin]]
             for s, rows in enumerate(self.parts):
@@ -198,7 +199,11 @@ class Tables:
         if count == 1:
             twice = np.zeros(2, dtype=int)
             found = self.modes(
-                of.take(twice), kind[twice], node[twice], start[:, twice], None if centre is None else centre[twice]
+                of.take(twice),
+                kind[twice],
+                node[twice],
+                start[:, twice],
+                None if centre is None else centre[twice],
             )
             return found[0][:1], found[1][:1], found[2][:, :1], found[3][:1]
         backend = get_backend()
@@ -296,7 +301,8 @@ class _Evaluation:
             step.append(inside - dr.gather(Float, tables.centres, self.node * size + i))
         cost, g, A = self._sums(step, z, width)
         R = [
-            [dr.select(free[i], root[i, j], 0.0) if j <= i else 0.0 for j in range(size)] + [0.0] * (width - size)
+            [dr.select(free[i], root[i, j], 0.0) if j <= i else 0.0 for j in range(size)]
+            + [0.0] * (width - size)
             for i in range(size)
         ]
         if width > size:
@@ -367,7 +373,8 @@ class _Evaluation:
                 return value if by is None else value * by
 
             M = [
-                dr.gather(Float, self.M[s], self.lane + k * self.stride) for k in range(terms * (terms + 1) // 2)
+                dr.gather(Float, self.M[s], self.lane + k * self.stride)
+                for k in range(terms * (terms + 1) // 2)
             ]
             b = [dr.gather(Float, self.b[s], self.lane + q * self.stride) for q in range(terms)]
 
@@ -380,7 +387,10 @@ class _Evaluation:
             away = [scaled(m - v) for m, v in zip(Mp, b, strict=True)]
             for i in range(size):
                 g[i] = g[i] + _total([slope * away[q] for q, slope in slopes[i].items()])
-                across = [scaled(scaled(_total([s * entry(q, r) for q, s in slopes[i].items()]))) for r in range(terms)]
+                across = [
+                    scaled(scaled(_total([s * entry(q, r) for q, s in slopes[i].items()])))
+                    for r in range(terms)
+                ]
                 for j in range(i + 1):
                     A[i, j] = A[i, j] + _total([slope * across[r] for r, slope in slopes[j].items()])
             if factor is not None:
@@ -396,7 +406,7 @@ def _runs(kind: np.ndarray, node: np.ndarray) -> list[tuple[int, int]]:
     """Begins and ends of runs of the same material and node."""
     changes = np.flatnonzero((np.diff(kind) != 0) | (np.diff(node) != 0)) + 1
     edges = [0, *changes.tolist(), len(kind)]
-    return list(zip(edges[:-1], edges[1:], strict=True)) if len(kind) else []
+    return list(pairwise(edges)) if len(kind) else []
 
 
 def _described(emulator: Emulator) -> np.ndarray:

@@ -32,14 +32,14 @@ __all__ = ["SharedGeometry"]
 BEYOND, FARTHER = 1e-6, 40.0
 #: The tables' squared errors in units of the data's, summed, are no more than this part of the spread of the distance,
 #: which is √(2 D) for D data; else the model itself is evaluated.
-TOLERATED = 0.01
+TOLERATED = 0.3
 #: Pairs of a pixel and a material that are followed together.
-TOGETHER = 1 << 15
+TOGETHER = 1 << 14
 #: A mode belongs to the node that is no farther than this in the distance of nodes, and is looked for in another one
 #: else, so many times; not where the distance is so many times what leaves a material out.
 OWN, MOVES, HOPELESS = 0.7, 5, 4.0
 #: A mode stays where the first step from it promises no more, and is left alone after so many steps.
-STAYS, STEPS = 0.05, 6
+STAYS, STEPS = 0.3, 4
 #: The model itself is evaluated for a material that one in so many of its pixels are as far from as this one.
 RUNNING = 1e-4
 
@@ -90,7 +90,11 @@ class SharedGeometry:
         for number, material in enumerate(materials):
             forms.setdefault(material.kernel, []).append(number)
         by_form = [emulators_of([materials[c] for c in members], like) for members in forms.values()]
-        found = {c: e for members, own in zip(forms.values(), by_form, strict=True) for c, e in zip(members, own, strict=True)}
+        found = {
+            c: e
+            for members, own in zip(forms.values(), by_form, strict=True)
+            for c, e in zip(members, own, strict=True)
+        }
         emulators = tuple(found[c] for c in range(len(materials)))
         screen = Screen.of(emulators, like.channels, gain)
         families = tuple(
