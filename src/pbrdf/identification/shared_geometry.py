@@ -39,7 +39,7 @@ TOGETHER = 1 << 14
 #: else, so many times; not where the distance is so many times what leaves a material out.
 OWN, MOVES, HOPELESS = 0.7, 5, 4.0
 #: A mode stays where the first step from it promises no more, and is left alone after so many steps.
-STAYS, STEPS = 0.3, 4
+STAYS, STEPS = 0.3, 8
 #: The model itself is evaluated for a material that one in so many of its pixels are as far from as this one.
 RUNNING = 1e-4
 
@@ -163,6 +163,10 @@ class SharedGeometry:
                     tables, kind[left], pixel[left], z[:, left], pixels, exact=True
                 )
                 left = left[(promised > STAYS) & (far[left] < within[left])]
+            # what is left has not come to rest: the best that is known of it is the model where it was last
+            found[left] += 0.5 * far[left]
+            far[left] = self._distance(tables, kind[left], pixel[left], z[:, left], pixels)
+            found[left] -= 0.5 * far[left]
             log_evidence[of, pixel], distance[of, pixel] = found, far
         return log_evidence.T, distance.T, freedom
 
@@ -195,6 +199,20 @@ class SharedGeometry:
             gains,
             None if gains is None else gains.mean(axis=0),
         )
+
+    def _distance(
+        self, tables: Tables, kind: np.ndarray, pixel: np.ndarray, z: np.ndarray, pixels: _Pixels
+    ) -> np.ndarray:
+        """Squared distance of pairs by the model itself where they are, shape (L,)."""
+        if not len(kind):
+            return np.empty(0)
+        modelled = shown(tables.emulators[0].material.space, tables.unknowns(kind, z), self.like)
+        if pixels.centre is not None:
+            scaled = self.screen.intensities
+            modelled[scaled] *= np.exp(pixels.centre[pixel] + GAIN_SPREAD * z[tables.size])
+        off = modelled - pixels.values.take(pixel, axis=1)
+        result: np.ndarray = (pixels.weights.take(pixel, axis=1) * off**2).sum(axis=0)
+        return result + (z[: tables.size] ** 2).sum(axis=0)
 
     def _followed(
         self,
