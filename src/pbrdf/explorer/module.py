@@ -27,6 +27,7 @@ PARTS = (
     "views/cuts.js",
     "views/sphere.js",
     "views/polar.js",
+    "views/map.js",
     "panels/models.js",
     "panels/parameters.js",
     "panels/light.js",

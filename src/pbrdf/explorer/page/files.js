@@ -26,6 +26,7 @@ function openFiles(app, el) {
     for (const layer of layers) addLayer(app, layer);
     // data want a model beside them
     if (!app.state && datasets.length + maps.length) addLayer(app, defaultLayer(app, Object.keys(app.catalogue.models)[0]));
+    if (maps.length) showMap(app, maps[0]);
   });
 
   // Files are taken wherever on the explorer they fall.
