@@ -18,7 +18,6 @@ function showMap(app, name) {
 VIEWS.push({
   name: "map",
   title: "Map",
-  wide: true,
   build(place, app) {
     const table = decoded(app.catalogue.colours.sequential);
     const settings = () => app.state?.settings.map ?? {};
@@ -85,8 +84,8 @@ VIEWS.push({
     };
     app.on("answer:map_picture", (content, [values, given]) => {
       asked = null;
-      const words = new Uint16Array(given.buffer.slice(given.byteOffset, given.byteOffset + given.byteLength));
-      held = { header: content, values: singles(values), kinds: words, image: null };
+      const [numbers, words] = [values, given].map(view => view.buffer.slice(view.byteOffset, view.byteOffset + view.byteLength));
+      held = { header: content, values: new Float32Array(numbers), kinds: new Uint16Array(words), image: null };
       if (content.key !== header?.key) { askPicture(); return; }
       describePicture();
       redraw();
@@ -141,11 +140,9 @@ VIEWS.push({
     keepSharp(canvas, redraw);
 
     function describePicture() {
-      const { range, title, unit, kinds: told, logarithmic, step, values: _ } = held.header;
+      const { range, title, unit, kinds: told, logarithmic, step } = held.header;
       legend.node.hidden = !range;
-      if (range) {
-        legend.show(table, range, unit, logarithmic ? `${title}, logarithmic` : title);
-      }
+      if (range) legend.show(table, range, unit, logarithmic ? `${title}, logarithmic` : title);
       kinds.replaceChildren(...told.map(kind => {
         const sample = element("span", { class: "sample", "aria-hidden": "true" });
         sample.style.background = kind.colour;
@@ -158,8 +155,9 @@ VIEWS.push({
       ].filter(Boolean).join(" ");
     }
 
-    // Regions: first row, first column, rows, columns.
-    const region = () => header.region;
+    // Regions: first row, first column, rows, columns. A turn of the wheel goes on from the last one, whose answer may be
+    // on its way.
+    const region = () => settings().region ?? [0, 0, ...header.size];
     const clamped = ([top, left, rows, columns]) => {
       const [h, w] = header.size;
       return [Math.round(Math.min(Math.max(top, 0), h - rows)), Math.round(Math.min(Math.max(left, 0), w - columns)), rows, columns];
@@ -172,7 +170,6 @@ VIEWS.push({
       const [top, left, rows, columns] = region(), [h, w] = header.size;
       const [row, column] = at ?? header.pixel?.at ?? [top + rows / 2, left + columns / 2];
       const next = [rows, columns].map((n, i) => Math.min(Math.max(Math.round(n * factor), Math.min(LEAST_REGION, [h, w][i])), [h, w][i]));
-      // where the longer side is as short as can be, the shorter one stays
       show(clamped([row - (row - top) * next[0] / rows, column - (column - left) * next[1] / columns, ...next]), going);
     }
     const fit = () => { if (header?.key) show([0, 0, ...header.size]); };
@@ -189,15 +186,15 @@ VIEWS.push({
       }, going);
     }
 
-    // Row and column under the pointer, of those that are shown.
+    // Row and column under the pointer, of the picture that is painted.
     const pixelAt = event => {
-      const box = canvas.getBoundingClientRect(), [top, left, rows, columns] = region(), { step } = header;
+      const box = canvas.getBoundingClientRect(), { region: [top, left, rows, columns], step } = (held ?? { header }).header;
       const row = Math.floor((event.clientY - box.top) / box.height * rows / step) * step, column = Math.floor((event.clientX - box.left) / box.width * columns / step) * step;
       return row < 0 || column < 0 || row >= rows || column >= columns ? null : [top + row, left + column];
     };
     const read = () => {
       const at = pointed, picture = held?.header;
-      let text = "Click a pixel, or move by the arrow keys (Shift: ten at once); + and − zoom, so does the wheel once the picture is chosen.";
+      let text = "Click a pixel or use the arrow keys; + and − zoom, so does the wheel after a click.";
       if (at && picture?.key === header.key) {
         const i = Math.floor((at[0] - picture.region[0]) / picture.step) * picture.columns + Math.floor((at[1] - picture.region[1]) / picture.step);
         const kind = held.kinds[i], names = header.dims.length > 1 ? header.dims : [null, ...header.dims];
