@@ -12,8 +12,7 @@ from pixel_helpers import blank
 
 
 def pictures(path):
-    found = blank(4, 5, 2, theta_i=("series", np.deg2rad([30.0, 40.0])))
-    found.to_netcdf(path, engine="h5netcdf")
+    blank(4, 5).to_netcdf(path, engine="h5netcdf")
 
 
 def test_files_are_found_relative_to_the_map(tmp_path):
@@ -22,7 +21,7 @@ def test_files_are_found_relative_to_the_map(tmp_path):
     told = MadeFrom.relative_to(
         tmp_path / "run" / "maps",
         [tmp_path / "run" / "stokes.nc"],
-        ["flat:theta_i=30,theta_r=40,phi=0"],
+        ["flat:theta_i=30,theta_r=40,phi=0,reference=0"],
         2.0,
     )
     assert told.files == ("../stokes.nc",)
