@@ -318,7 +318,9 @@ def _held_out(given: Any, dataset: xr.Dataset) -> HoldOut | None:
 
 def answer(request: dict[str, Any], buffers: Any, workspace: Workspace, emit: Emit) -> None:
     """Answer ``{"type": "data", "state": …}`` with what the page lists of the open data, the chosen one in detail."""
-    chosen = chosen_data(read_state(request.get("state")), workspace)
+    # pixels of maps have data that are opened when a state names them
+    some = workspace.datasets or workspace.maps
+    chosen = chosen_data(read_state(request.get("state")), workspace) if some else None
     names = [name for name, _ in workspace.datasets]
     content = {"type": "data", "id": request.get("id"), "sets": names, "chosen": None}
     if chosen is not None:
