@@ -61,7 +61,12 @@ def pixel_data(shape=SHAPE, dims=("y", "x")):
         factor[2, 0] = np.nan
     scale = xr.DataArray(factor, dims=dims)
     with xr.set_options(keep_attrs=True):
-        return (ds * scale).assign_attrs(ds.attrs).transpose("geometry", *dims, ...)
+        found = (ds * scale).assign_attrs(ds.attrs).transpose("geometry", *dims, ...)
+    # as pictures have them: no data set of the schema does
+    names = [f"s{k}" for k in range(found.sizes["geometry"])]
+    return found.assign_coords(series=("geometry", names), height=(dims, factor)).assign(
+        label=(dims, np.ones(shape, int))
+    )
 
 
 def material_map(shape=SHAPE):

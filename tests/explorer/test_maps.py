@@ -287,8 +287,8 @@ def test_data_are_found_where_the_map_says(tmp_path):
     # a map that was dropped on the page may name no file of this machine
     dropped = Workspace(maps=list(workspace.maps))
     answer = asked(dropped, pixel=[3, 2])
-    assert answer["data"] is None and "not known" in answer["said"][0]
-    assert "not known" in view.draw(shown(dropped, pixel=[3, 2]), dropped, False)[0]["no_data"]
+    assert answer["data"] is None and "not for one that was dropped" in answer["said"][0]
+    assert "dropped" in view.draw(shown(dropped, pixel=[3, 2]), dropped, False)[0]["no_data"]
     # other data under that name
     found = workspace.maps[0][1]
     settings = {"input": {"files": [{"variables": {}, "size": 1, "digest": "0"}]}}
@@ -312,7 +312,8 @@ def test_data_that_are_opened_beside_a_map(tmp_path):
     assert asked(workspace, pixel=[3, 2])["data"]["set"] == "paint at y 3, x 2"
     # those of another image are not this map's
     other = Workspace(maps=[("paint", parameter_map((8, 9)))], pictures=workspace.pictures)
-    assert asked(other, pixel=[3, 2])["data"] is None
+    refused = asked(other, pixel=[3, 2])
+    assert refused["data"] is None and "does not say where its data are" in refused["said"][0]
 
 
 def test_without_a_map():

@@ -12,7 +12,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from pbrdf.data.schema import COVARIANCE, DIMENSION, STOKES_AXES, VARIABLES, std_name
+from pbrdf.data.schema import COORDINATES, COVARIANCE, DIMENSION, STOKES_AXES, VARIABLES, std_name
 from pbrdf.data.select import measured_channels
 from pbrdf.data.validation import validate
 from pbrdf.errors import DataError, PbrdfError
@@ -80,6 +80,11 @@ def data_in_words(name: str, workspace: Workspace) -> str:
     """Why the data of a map cannot be found; empty where they may be. They are not opened."""
     if _beside(name, workspace) is not None or _told(name, workspace) is not None:
         return ""
+    if MadeFrom.of(dict(reversed(workspace.maps))[name].attrs) is not None:
+        return (
+            "What was measured here is found for a map that is opened by its name, pbrdf explore MAP, not for one that "
+            "was dropped on the page."
+        )
     return (
         "What was measured here is not known: the map does not say where its data are. Open them beside it, "
         "pbrdf explore MAP DATA."
@@ -147,15 +152,8 @@ def _measured_at(name: str, indices: dict[str, int], workspace: Workspace) -> xr
     """
     block = _source(name, workspace).block({dim: slice(at, at + 1) for dim, at in indices.items()})
     one = block.isel(dict.fromkeys(indices, 0)).load()
-    known = {*VARIABLES, *map(std_name, VARIABLES), COVARIANCE}
-    one = one.drop_vars(
-        [
-            n
-            for n, variable in one.variables.items()
-            if (n not in known and n in one.data_vars)
-            or (n in one.coords and DIMENSION not in variable.dims and n not in STOKES_AXES)
-        ]
-    ).transpose(DIMENSION, ...)
+    known = {*VARIABLES, *map(std_name, VARIABLES), COVARIANCE, *COORDINATES, *STOKES_AXES}
+    one = one.drop_vars([n for n in one.variables if n not in known]).transpose(DIMENSION, ...)
     angles = np.stack([one[n].values for n in ("theta_i", "theta_r", "phi")])
     is_direction = np.isfinite(angles).all(axis=0) & ((angles[:2] >= 0.0) & (angles[:2] < 0.5 * np.pi)).all(
         axis=0

@@ -5,11 +5,11 @@ const LEAST_REGION = 8;
 // Time after the last key or turn of the wheel that makes one step of undo of them all, ms.
 const MAP_SETTLED = 500;
 
-// Put the map on the stage.
-function showMap(app, name) {
+// Put a map on the stage, beside the views that are there, or others if the page has not said which.
+function showMap(app, name, others) {
   app.change(state => {
     const page = state.settings.page ??= {};
-    page.views ??= [...FIRST_VIEWS];
+    page.views ??= [...others];
     if (!page.views.includes("map")) page.views.push("map");
     state.settings.map = { name };
   });
