@@ -13,6 +13,7 @@ from xarray.core import indexing
 import pbrdf
 from pbrdf.errors import PbrdfError
 from pbrdf.explorer import map_pixels, maps
+from pbrdf.explorer.fitting import job_of
 from pbrdf.explorer.maps import chosen_map
 from pbrdf.explorer.opening import is_map, open_source
 from pbrdf.explorer.points import chosen_data
@@ -208,6 +209,16 @@ def test_words_of_a_pixel():
     assert "did not converge" in told(STATES[PixelStatus.NOT_CONVERGED])["status"]
 
 
+def test_a_map_that_is_being_filled_is_read_again():
+    found = parameter_map(units_missing=1)
+    workspace = Workspace(maps=[("paint", found)])
+    chosen = chosen_map(shown(workspace, pixel=list(STATES[-1])), workspace)
+    assert chosen.described_pixel(workspace)["status"] == "Nobody has fitted it yet."
+    found["status"][STATES[-1]] = 0
+    assert chosen.described_pixel(workspace)["status"] == "The fit converged."
+    assert view.draw(shown(workspace), workspace, False)[0]["left"] == 1
+
+
 def asked(workspace, **settings):
     """The answer to a page that asks for the chosen pixel."""
     answers = []
@@ -231,6 +242,8 @@ def test_the_pixels_model_and_its_data():
     # a state that names a pixel finds it, also before it was asked for
     points = chosen_data(read_state(state), workspace).measured.whole
     np.testing.assert_array_equal(points["I"], data["I"].isel(y=4, x=6))
+    # a fit takes them
+    assert job_of(read_state(state), workspace)["dataset"].identical(points)
     assert [name for name, _ in workspace.datasets] == ["paint at y 3, x 2", "paint at y 4, x 6"]
     for column in range(7):
         asked(workspace, pixel=[0, column])

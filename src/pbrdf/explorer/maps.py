@@ -145,6 +145,11 @@ class ChosenMap:
         return json.dumps([self.name, self.variable.name, self.place, self.region], ensure_ascii=False)
 
     @property
+    def left(self) -> int:
+        """Parts of the map that were not fitted when it was opened."""
+        return int(self.dataset.attrs.get("units_missing", 0))
+
+    @property
     def is_of_parameters(self) -> bool:
         """Whether it is a map of parameters, and not of materials."""
         return "estimate" in self.dataset
@@ -270,7 +275,8 @@ class ChosenMap:
         """All that the map says of the chosen pixel, in memory."""
         key = json.dumps([self.name, self.indices])
         known = _said.get(workspace)
-        if known is None or known[0] != key:
+        # what is not all fitted goes on changing
+        if known is None or known[0] != key or self.left:
             names = [name for name in _OF_A_PIXEL if name in self.dataset]
             known = _said[workspace] = key, self.dataset[names].isel(self.indices).load()
         return known[1]
@@ -315,7 +321,7 @@ class ChosenMap:
     def _where(self) -> str:
         """The chosen pixel in words, with its coordinates where the map has some."""
         told = []
-        sides = ("rows from the top", "columns from the left")[-len(self.dims) :]
+        sides = ("rows from the top", "columns from the left") if len(self.dims) == 2 else ("from the left",)
         for dim, index in self.indices.items():
             side = f" ({sides[self.dims.index(dim)]})" if dim in self.dims else ""
             value = ""

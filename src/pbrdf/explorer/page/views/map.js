@@ -130,11 +130,11 @@ VIEWS.push({
       const [row, column] = header.pixel.at;
       const x = Math.floor((column - left) / step) * step * across, y = Math.floor((row - top) / step) * step * down;
       // a dark ring around a light one is seen on every colour; single pixels of a large map are too small for it
-      const size = Math.max(step * Math.max(across, down), 9 * devicePixelRatio), middle = [x + step * across / 2, y + step * down / 2];
+      const [wide, high] = [across, down].map(size => Math.max(step * size, 9 * devicePixelRatio));
       for (const [colour, width] of [["#000", 4], ["#fff", 2]]) {
         context.strokeStyle = colour;
         context.lineWidth = width * devicePixelRatio;
-        context.strokeRect(middle[0] - size / 2, middle[1] - size / 2, size, size);
+        context.strokeRect(x + (step * across - wide) / 2, y + (step * down - high) / 2, wide, high);
       }
     }
     keepSharp(canvas, redraw);
