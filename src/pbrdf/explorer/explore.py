@@ -72,7 +72,6 @@ def _add(workspace: Workspace, name: str | None, thing: Any) -> None:
 
     from pbrdf.data.schema import DIMENSION, STOKES_AXES
     from pbrdf.data.validation import validate
-    from pbrdf.inversion.map_store import DatasetSource
     from pbrdf.inversion.result import FitResult
 
     if isinstance(thing, Model):
@@ -83,6 +82,8 @@ def _add(workspace: Workspace, name: str | None, thing: Any) -> None:
         if is_map(thing):
             workspace.add_map(name or "map", thing)
         elif {str(dim) for dim in thing.dims} - {DIMENSION, *STOKES_AXES}:
+            from pbrdf.inversion.map_store import DatasetSource
+
             workspace.pictures.append((name or "data", DatasetSource(thing)))
         else:
             validate(thing, origin=name or "")

@@ -17,7 +17,6 @@ import numpy as np
 from pbrdf.data.origin import of_rows
 from pbrdf.errors import PbrdfError
 from pbrdf.explorer.fit_process import process_of
-from pbrdf.explorer.map_pixels import open_pixel
 from pbrdf.explorer.session import Emit
 from pbrdf.explorer.state import State, StateError, number, read_state
 from pbrdf.explorer.workspace import Workspace
@@ -255,7 +254,10 @@ def chosen_data(state: State, workspace: Workspace) -> Choice | None:
         If the settings are none, or name what is not there.
     """
     settings = state.settings.get("data", {})
-    open_pixel(settings.get("set"), workspace)
+    if workspace.maps:
+        from pbrdf.explorer.map_pixels import open_pixel
+
+        open_pixel(settings.get("set"), workspace)
     if not workspace.datasets:
         return None
     by_name = dict(reversed(workspace.datasets))

@@ -8,8 +8,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from pbrdf.explorer.map_pixels import data_in_words
-from pbrdf.explorer.maps import chosen_map, variables_of
 from pbrdf.explorer.state import State
 from pbrdf.explorer.workspace import Workspace
 
@@ -24,6 +22,10 @@ def draw(state: State, workspace: Workspace, dragging: bool) -> tuple[dict[str, 
     StateError
         If the settings name what is not there.
     """
+    # a page without maps does not wait for what they need
+    from pbrdf.explorer.map_pixels import data_in_words
+    from pbrdf.explorer.maps import chosen_map, variables_of
+
     maps = [name for name, _ in workspace.maps]
     chosen = chosen_map(state, workspace)
     if chosen is None:
