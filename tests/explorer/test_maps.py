@@ -334,3 +334,21 @@ def test_without_a_map():
     assert view.draw(shown(workspace), workspace, False) == ({"maps": []}, [])
     with pytest.raises(StateError, match="no map is open"):
         maps.answer({"state": shown(workspace).to_dict()}, [], workspace, None)
+
+
+def test_data_of_pixels_that_are_dropped_say_where_they_belong(tmp_path):
+    from pbrdf.explorer.upload_process import _opened
+
+    stored(pixel_data(), tmp_path / "data.nc")
+    assert "opened beside their map: pbrdf explore MAP" in _opened(str(tmp_path / "data.nc"), {})
+
+
+def test_maps_and_their_data_in_python():
+    from pbrdf.explorer.explore import _add
+
+    workspace = Workspace()
+    _add(workspace, "paint", parameter_map())
+    _add(workspace, None, pixel_data())
+    _add(workspace, None, material_map())
+    assert [name for name, _ in workspace.maps] == ["paint", "map"]
+    assert asked(workspace, name="paint", pixel=[3, 2])["data"]["set"] == "paint at y 3, x 2"
