@@ -259,6 +259,25 @@ def test_the_pixels_model_and_its_data():
         asked(workspace)
 
 
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("paint at y 2, x 0", "Nothing was measured"),
+        *((f"paint at {place}", "no data called") for place in ("y 3", "y 3, x 7", "y 3, parameter 1", "")),
+        ("other at y 3, x 2", "no data called"),
+        ("paint at " + "y 1, " * 200_000, "no data called"),
+    ],
+)
+def test_states_that_name_no_pixel(name, words):
+    workspace = Workspace(maps=[("paint", parameter_map())], pictures=[("data", DatasetSource(pixel_data()))])
+    workspace.add_dataset("own", pbrdf.open_experiment(made_maps.PAINT))
+    state = shown(workspace).to_dict()
+    state["settings"]["data"] = {"set": name}
+    with pytest.raises(StateError, match=words) as refused:
+        chosen_data(read_state(state), workspace)
+    assert refused.value.place == "settings.data.set"
+
+
 def test_values_that_a_fit_leaves_out_are_left_out():
     data = pixel_data()
     data["I"][0, 3, 2] = np.inf

@@ -22,6 +22,7 @@ from pbrdf.explorer.session import Emit
 from pbrdf.explorer.state import StateError, read_state
 from pbrdf.explorer.workspace import Workspace
 from pbrdf.inversion.map_store.made_from import MadeFrom
+from pbrdf.inversion.map_store.picture_source import PictureSource
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -33,6 +34,8 @@ __all__ = ["answer", "data_in_words", "open_pixel"]
 #: Pixels whose data are open at once, at most; those that are opened first go first.
 MOST_PIXELS = 16
 _NAME = re.compile(r"(?P<map>.+) at (?P<place>\w+ \d{1,9}(?:, \w+ \d{1,9})*)", re.DOTALL)
+#: Letters of such a name, at most.
+_LONGEST = 500
 #: The data of maps that say where these are, by the names of the maps.
 _found: WeakKeyDictionary[Workspace, dict[str, MapSource]] = WeakKeyDictionary()
 
@@ -43,7 +46,7 @@ def _name_of(name: str, indices: dict[str, int]) -> str:
 
 def _named(name: str, workspace: Workspace) -> tuple[str, dict[str, int]] | None:
     """The map and the indices that the name of a pixel's data says; None where it is no such name."""
-    match = _NAME.fullmatch(name)
+    match = _NAME.fullmatch(name) if len(name) <= _LONGEST else None
     if match is None:
         return None
     dataset = dict(reversed(workspace.maps)).get(match["map"])
@@ -51,7 +54,7 @@ def _named(name: str, workspace: Workspace) -> tuple[str, dict[str, int]] | None
         return None
     pairs = [part.rsplit(" ", 1) for part in match["place"].split(", ")]
     indices = {dim: int(index) for dim, index in pairs}
-    if any(dim not in dataset.sizes or not 0 <= at < dataset.sizes[dim] for dim, at in indices.items()):
+    if {*indices} != {*dims_of(dataset)} or any(at >= dataset.sizes[dim] for dim, at in indices.items()):
         return None
     return match["map"], indices
 
@@ -61,7 +64,7 @@ def open_pixel(name: Any, workspace: Workspace) -> None:
 
     Raises
     ------
-    PbrdfError
+    StateError
         If they cannot be read.
     """
     if not isinstance(name, str) or name in dict(workspace.datasets):
@@ -69,7 +72,10 @@ def open_pixel(name: Any, workspace: Workspace) -> None:
     named = _named(name, workspace)
     if named is None:
         return
-    dataset = _measured_at(*named, workspace)
+    try:
+        dataset = _measured_at(*named, workspace)
+    except PbrdfError as error:
+        raise StateError("settings.data.set", str(error)) from None
     opened = [i for i, (other, _) in enumerate(workspace.datasets) if _named(other, workspace) is not None]
     if len(opened) >= MOST_PIXELS:
         del workspace.datasets[opened[0]]
@@ -96,7 +102,8 @@ def _beside(name: str, workspace: Workspace) -> MapSource | None:
     dataset = dict(reversed(workspace.maps))[name]
     wanted = {dim: dataset.sizes[dim] for dim in dims_of(dataset)}
     for _, source in workspace.pictures:
-        sizes = source.outline().sizes
+        # the outline of files reads a pixel of each
+        sizes = source.sizes if isinstance(source, PictureSource) else source.outline().sizes
         if all(sizes.get(dim) == size for dim, size in wanted.items()):
             return source
     return None
