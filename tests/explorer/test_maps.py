@@ -302,6 +302,7 @@ def stored(dataset, path):
     dataset[keep].to_netcdf(path, engine="h5netcdf")
 
 
+@pytest.mark.slow
 def test_data_are_found_where_the_map_says(tmp_path):
     from pbrdf.files.netcdf_files import write_netcdf_file
 
@@ -336,6 +337,7 @@ def test_data_are_found_where_the_map_says(tmp_path):
     )
 
 
+@pytest.mark.slow
 def test_data_that_are_opened_beside_a_map(tmp_path):
     stored(pixel_data(), tmp_path / "data.nc")
     workspace = Workspace(maps=[("paint", parameter_map())])
@@ -355,6 +357,7 @@ def test_without_a_map():
         maps.answer({"state": shown(workspace).to_dict()}, [], workspace, None)
 
 
+@pytest.mark.slow
 def test_data_of_pixels_that_are_dropped_say_where_they_belong(tmp_path):
     from pbrdf.explorer.upload_process import _opened
 
