@@ -32,7 +32,8 @@ from rich.table import Table
 
 import pbrdf
 from pbrdf.identification.confusion import confusion
-from pbrdf.identification.identify import calibrate_library, identify
+from pbrdf.identification.identify import identify
+from pbrdf.identification.labelled import calibrate_library
 from pbrdf.identification.library import Library
 from pbrdf.identification.material import material_from_fits
 from pbrdf.inversion.result import FitResult

@@ -26,9 +26,11 @@ if TYPE_CHECKING:
     from pbrdf.data.paints import PAINTS, load_paint, open_experiment
     from pbrdf.data.readers import register_reader
     from pbrdf.identification.class_map import identify_map
-    from pbrdf.identification.identify import calibrate_library, identify
+    from pbrdf.identification.identify import identify
+    from pbrdf.identification.labelled import calibrate_library
     from pbrdf.identification.library import Library, bundled_library, read_library
     from pbrdf.identification.material import material_from_fits, material_from_model
+    from pbrdf.identification.telling_apart import next_measurement
     from pbrdf.instruments.calibration.instrument_calibration import calibrate_instrument
     from pbrdf.instruments.goniometer.protocols import Protocol
     from pbrdf.instruments.pixel_geometry.geometries import as_geometries
@@ -139,12 +141,13 @@ _HOME = {
     # which material it is
     "identify": "pbrdf.identification.identify",
     "identify_map": "pbrdf.identification.class_map",
-    "calibrate_library": "pbrdf.identification.identify",
+    "calibrate_library": "pbrdf.identification.labelled",
     "Library": "pbrdf.identification.library",
     "read_library": "pbrdf.identification.library",
     "bundled_library": "pbrdf.identification.library",
     "material_from_fits": "pbrdf.identification.material",
     "material_from_model": "pbrdf.identification.material",
+    "next_measurement": "pbrdf.identification.telling_apart",
     # polarimeters and their calibration
     "Instrument": "pbrdf.instruments.polarimeter.instrument",
     "load_instrument": "pbrdf.instruments.polarimeter.instrument_files",
@@ -241,6 +244,7 @@ __all__ = [
     "material_from_fits",
     "material_from_model",
     "merit",
+    "next_measurement",
     "open_experiment",
     "open_map",
     "parse_pixel_geometry",
@@ -272,6 +276,7 @@ __all__ = [
 
 point_drjit_to_llvm()
 provide_presenter("fit", lambda: importlib.import_module("pbrdf.report.fit.presenter"))
+provide_presenter("identification", lambda: importlib.import_module("pbrdf.report.identification.presenter"))
 
 
 def __getattr__(name: str) -> Any:

@@ -192,6 +192,52 @@ def test_calibration_goes_into_the_librarys_file(run, labelled, tmp_path):
     assert not (tmp_path / "labelled-calibration" / "library.json").exists()
 
 
+@pytest.mark.slow
+def test_labelled_measurements_judge_the_library_as_it_is(run, labelled, stranger, tmp_path):
+    bundled_library().write(tmp_path / "paints.json")
+    before = (tmp_path / "paints.json").read_bytes()
+    with (tmp_path / "data" / "labelled.csv").open("a", encoding="utf-8") as file:
+        file.write("../stranger.nc, gloss\n")
+    asked = ("identify", "--labelled", "data/labelled.csv", "--library", "paints.json")
+    printed = " ".join(run(*asked, "-o", "out").stdout.split())
+    assert "of 15 labelled measurements the 95 % set held the true material" in printed
+    assert "gloss (not in the library) 1" in printed
+    assert "left unchanged" in printed
+    assert (tmp_path / "paints.json").read_bytes() == before
+    assert {"index.html", "labelled.json", "confusion.png", "reliability.png"} <= {
+        p.name for p in (tmp_path / "out").iterdir()
+    }
+    assert run(*asked, "-q").stdout.startswith("data/labelled.csv: of 15 labelled measurements")
+
+
+def test_labels_of_pixels(run, picture, tmp_path):
+    """Two rows told rightly, a stranger, and a row that was not measured."""
+    names = np.array([["white"] * 5, ["cd-back"] * 5, ["gloss"] * 5, ["white"] * 5])
+    np.save(tmp_path / "names.npy", names)
+    printed = " ".join(
+        run("identify", "map.nc", "--labelled", "names.npy", "-o", "out", "--no-figures").stdout.split()
+    )
+    assert "names.npy: of 10 labelled pixels the 95 % set held the true material" in printed
+    assert "of 5 labelled pixels of materials that the library has not got 5 were told as none" in printed
+    record = json.loads((tmp_path / "out" / "classes.json").read_text(encoding="utf-8"))
+    assert record["labelled"]["materials"] == ["white", "cd-back", "gloss"]
+
+
+@pytest.mark.slow
+def test_a_fit_without_its_data(run, refused, tmp_path):
+    data = pbrdf.open_experiment("white").isel(geometry=slice(0, 63, 4)).assign_attrs(scale="absolute")
+    pbrdf.fit(data, starts=4).save(tmp_path / "white-fit")
+    (tmp_path / "white-fit" / "fit.nc").unlink()
+    for source in ("white-fit", "white-fit/fit.json"):
+        printed = " ".join(run("identify", source).stdout.split())
+        assert "white: the only material in the 95 % set" in printed
+        assert "From fitted parameters, as the data were not at hand" in printed
+    assert "--gain: white-fit holds fitted parameters" in refused("identify", "white-fit", "--gain", "known")
+    assert "leave --quantity out" in refused("identify", "white-fit", "--quantity", "brdf")
+    assert "a model without standard errors" in refused("identify", "white-fit/model.json")
+    assert "without its fit.nc" in refused("library", "add", "white", "white-fit")
+
+
 def test_what_is_refused(refused, tmp_path, picture):
     assert "name the data to identify" in refused("identify")
     assert "leave white out" in refused("identify", "white", "--calibrate", "labelled.csv")
@@ -210,6 +256,12 @@ def test_what_is_refused(refused, tmp_path, picture):
     assert "two data sets are called 'white'" in refused("identify", "white", "a/white", "-o", "out")
     assert "holds fitted parameters" in refused("identify", "map.nc", "--gain", "known")
     assert "leave it out" in refused("identify", "map.nc", "--quantity", "brdf")
+    assert "white is one measurement" in refused("identify", "white", "--labelled", "labels.csv")
+    assert "is of one map" in refused("identify", "map.nc", "white", "--labelled", "labels.npy")
+    assert "--calibrate judges its own" in refused("identify", "--labelled", "a.csv", "--calibrate", "a.csv")
+    assert "--labelled labels.npy: there is no such file" in refused(
+        "identify", "map.nc", "--labelled", "labels.npy"
+    )
 
 
 def test_tables_of_labels_that_are_refused(refused, tmp_path):
@@ -222,5 +274,60 @@ def test_tables_of_labels_that_are_refused(refused, tmp_path):
     assert "line 2: file or material is missing" in table("file,material\nwhite\n")
     assert "line 3: the library has no material 'gloss'" in table("file,material\nwhite,white\nwhite,gloss\n")
     assert "line 2: absent.csv: there is no such file" in table("material,file\nwhite,absent.csv\n")
+    assert "--labelled labels.csv: line 2: absent.csv" in refused("identify", "--labelled", "labels.csv")
     (tmp_path / "labels.csv").unlink()
     assert "labels.csv: cannot be read" in refused("identify", "--calibrate", "labels.csv")
+
+
+@pytest.mark.slow
+def test_many_wavelengths_are_a_choice(refused, run, tmp_path):
+    few = pbrdf.open_experiment("white").isel(geometry=FEW * 2)
+    many = few.assign_coords(wavelength=("geometry", 400.0 + 50.0 * np.arange(8)))
+    pbrdf.write(many, tmp_path / "many.nc")
+    text = refused("identify", "many.nc")
+    assert "there are 8 wavelengths, 400 … 750 nm, and each material of the library is of one" in text
+    assert "--wavelength 600" in text
+    assert "--select wavelength=400:750" in text
+    assert run("identify", "many.nc", "--wavelength", 450, "-q").output.startswith("many.nc: ")
+    (tmp_path / "labels.csv").write_text("file,material\nmany.nc,white\n", encoding="utf-8")
+    assert "there are 8 wavelengths" in refused("identify", "--calibrate", "labels.csv")
+
+
+@pytest.mark.slow
+def test_unfinished_maps_and_pictures_are_not_identified(refused, tmp_path):
+    """A map whose units are not all done, as an interrupted `pbrdf map` leaves it; pictures of `pbrdf reduce`."""
+    from pbrdf.inversion.map_store import DatasetSource, prepare_store
+    from pbrdf.inversion.parameter_map import MapFit
+
+    one = measured(bundled_library()["white"].model)
+    data = one.map(
+        lambda values: values.expand_dims(y=2, x=2).transpose("geometry", "y", "x"), keep_attrs=True
+    )
+    prepare_store(tmp_path / "half.zarr", MapFit.prepare(data), DatasetSource(data))
+    assert "half.zarr: this map is not complete: 1 of 1 units are missing" in refused("identify", "half.zarr")
+    pictures = xr.Dataset({"I": (("series", "y", "x"), np.ones((2, 3, 4)))})
+    pictures.to_netcdf(tmp_path / "stokes.nc", engine="h5netcdf")
+    text = refused("identify", "stokes.nc")
+    assert "Stokes pictures, whose pixels have no geometry yet: `pbrdf map stokes.nc -g flat:…`" in text
+    assert "pbrdf.map_dataset" in text
+
+
+def test_what_to_measure_next(run, tmp_path):
+    """One reading leaves several materials: the answer says which reading would tell them apart."""
+    pbrdf.write(measured(pbrdf.load_paint("cd-back")).isel(geometry=[1]), tmp_path / "one.nc")
+    printed = " ".join(run("identify", "one.nc", "--gain", "unknown", "--noise", "5%").stdout.split())
+    assert "Next measurement: I, Q, U at θi" in printed
+    assert "bits that are open" in printed
+    without = run("identify", "one.nc", "--gain", "unknown", "--noise", "5%", "--no-next").stdout
+    assert "Next measurement" not in without
+    assert "Next measurement" not in run("identify", "white").stdout  # nothing to tell apart
+
+
+@pytest.mark.slow
+def test_what_to_measure_next_in_the_folder(run, tmp_path):
+    pbrdf.write(measured(pbrdf.load_paint("cd-back")).isel(geometry=[1]), tmp_path / "one.nc")
+    run("identify", "one.nc", "--gain", "unknown", "-o", "out", "-q")
+    record = json.loads((tmp_path / "out" / "identification.json").read_text(encoding="utf-8"))
+    best = record["next_measurement"]["geometries"][0]
+    assert 0.0 < best["expected_bits"] <= record["next_measurement"]["open_bits"]
+    assert (tmp_path / "out" / "next.png").stat().st_size > 10_000

@@ -25,7 +25,7 @@ def fits(tmp_path_factory):
 
 @pytest.mark.slow
 def test_one_specimen_shows_that_its_scatter_is_assumed(run, fits, tmp_path):
-    result = run("library", "add", "thick", fits[0], "-o", "paints.json", "--scatter", "sigma=0.15,n=0.02")
+    result = run("library", "add", "thick", fits[0], "-l", "paints.json", "--scatter", "sigma=0.15,n=0.02")
     assert "Scatter between specimens: assumed (1 specimen)." in result.stdout
     assert "From: fit panel-0: panel 0" in result.stdout
     assert "Written: paints.json, 1 material" in result.stdout
@@ -108,7 +108,7 @@ def test_what_is_refused(refused, tmp_path):
         "library", "add", "a", "white", "--scatter", "sigma"
     )
     assert "absent.csv: there is no such file" in refused("library", "add", "a", "absent.csv")
-    assert "there is no folder none" in refused("library", "add", "a", "white", "-o", "none/paints.json")
+    assert "there is no folder none" in refused("library", "add", "a", "white", "-l", "none/paints.json")
     assert "paints.json: cannot be read" in refused("library", "list", "--library", "paints.json")
     assert "the bundled paints: the library has no material 'gloss'" in refused("library", "show", "gloss")
     (tmp_path / "text.json").write_text("[]", encoding="utf-8")
@@ -129,3 +129,64 @@ def test_a_number_that_only_python_knows_is_refused_in_a_group_too(refused):
     assert "--wavelength: '4_76' is not a number" in refused(
         "library", "add", "a", "white", "--wavelength", "4_76"
     )
+
+
+@pytest.mark.slow
+def test_one_rule_says_which_library_is_meant(run, refused, tmp_path):
+    """A file that is named first or with --library, else library.json of this folder, else the bundled paints."""
+    Library(bundled_library().materials[:2]).write(tmp_path / "paints.json")
+    listed = run("library", "list", "paints.json").stdout
+    assert listed.startswith("paints.json: 2 materials")
+    assert run("library", "list", "--library", "paints.json").stdout == listed
+    assert run("library", "show", "paints.json", "white").stdout.startswith("white: double-gauss")
+    assert "there is no library.json in this folder" in refused("library", "remove", "white")
+    assert run("library", "list").stdout.startswith("the bundled paints: 5")
+    (tmp_path / "paints.json").rename(tmp_path / "library.json")
+    assert run("library", "list").stdout.startswith("library.json: 2 materials")
+    assert "Library: library.json, 2 materials." in run("identify", "white").stdout
+    run("library", "remove", "library.json", "white")
+    assert read_library(tmp_path / "library.json").names == ["matte-white-thin"]
+    assert "two libraries are named" in refused("library", "list", "a.json", "-l", "b.json")
+    assert "a library's file ends in .json" in refused("library", "list", "white")
+    assert "name its specimens as well" in refused("library", "add", "paints.json", "white")
+
+
+@pytest.mark.slow
+def test_a_model_is_named_and_how_data_were_read_is_kept(run, refused, fits, tmp_path):
+    pbrdf.write(pbrdf.open_experiment("cd-back").isel(geometry=BRIEF), tmp_path / "back.nc")
+    run(
+        "library",
+        "add",
+        "back",
+        "back.nc",
+        "--select",
+        "theta_i=0:80",
+        "--model",
+        "reciprocal-double-gauss",
+        "-q",
+    )
+    (made,) = read_library(tmp_path / "library.json").materials
+    assert made.space.model.name == "reciprocal-double-gauss"
+    assert made.provenance[0].endswith("(--select theta_i=0:80 --model reciprocal-double-gauss)")
+    assert "is a fit, of a model already" in refused(
+        "library", "add", "a", fits[0], "--model", "double-gauss"
+    )
+
+
+@pytest.mark.slow
+def test_fits_that_are_not_sound(run, refused, tmp_path):
+    """A cosine of the intensity is described in part, alternating intensities not at all."""
+    data = pbrdf.open_experiment("white").isel(geometry=BRIEF)
+    number = np.arange(data.sizes["geometry"])
+    for name, factor in (("bent", 1.0 + 0.6 * np.sin(number)), ("wild", 8.0 ** (number % 3 - 1))):
+        bent = data.assign({channel: data[channel] * factor for channel in "IQU"})
+        pbrdf.fit(bent, starts=2).save(tmp_path / f"{name}-fit")
+    said = run("library", "add", "bent", "bent-fit").stderr
+    assert "bent: 1 of 1 fits is not sound" in said
+    assert "Caution: the fits behind bent are not sound" in " ".join(run("library", "list").stdout.split())
+    shown = " ".join(run("library", "show", "bent").stdout.split())
+    assert "Caution: the fit of bent-fit: The model describes the data in part" in shown
+    assert "What to do: find a model" in shown
+    assert "Caution: the model misses its own specimens" in shown
+    assert "Caution: the fits behind bent are not sound" in " ".join(run("identify", "white").stdout.split())
+    assert "No material can be made of them" in refused("library", "add", "wild", "wild-fit")

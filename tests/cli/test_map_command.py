@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -236,6 +237,18 @@ def test_a_map_of_other_settings_is_not_gone_on_with(at_trial, tmp_path, whole):
     assert "begun with other settings: fit.seed: 0 in the store, 1 here" in told.stderr
     told = at_trial(*common[:4], "-o", "paint.zarr", "--no-figures", code=2).stderr
     assert "input.labels" in told
+
+
+@pytest.mark.slow
+def test_units_of_a_map_that_is_begun_stay(at_trial, tmp_path, whole):
+    shutil.copytree(whole, tmp_path / "paint.zarr")
+    common = ("map", "trial/reduced/stokes.zarr", "-g", "flat", "-o", "paint.zarr", *FIT)
+    words = (
+        "--unit: paint.zarr was begun in units of 8 × 8 pixels, and goes on in these; 16 × 16 are asked for"
+    )
+    assert words in at_trial(*common, "--unit", 16, code=2).stderr
+    told = at_trial(*common, "--unit", 8).stdout
+    assert "medians by part of the sample" in told
 
 
 @pytest.mark.slow
@@ -509,7 +522,10 @@ def test_the_film_polarisers_as_far_as_one_picture_goes(run, tmp_path, measured)
         (("ball.nc", "-g", "{}", "-g", "{}"), "2 geometries for 1 files"),
         (("ball.nc", "-g", "{}", "--figure-format", "gif"), "--figure-format 'gif'"),
         (("ball.nc", "-g", "{}", "--max-memory", "much"), "--max-memory 'much': give a size such as 200MB"),
-        (("one.csv", "-g", "flat"), "one.csv"),
+        (
+            ("one.csv", "-g", "flat"),
+            "one.csv: is neither netCDF nor a Zarr folder, and a map is made of pictures",
+        ),
     ],
 )
 def test_refusals_are_one_line(refused, tmp_path, ball, arguments, words):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from pbrdf.identification.conformal import calibrate, nominal, probabilities, reliability
+from pbrdf.identification.conformal import Calibration, calibrate, nominal, probabilities, reliability
 
 NAMES = ("a", "b", "c")
 
@@ -95,3 +95,20 @@ def test_measurements_that_are_all_told_rightly_do_not_sharpen_the_likelihoods()
     assert calibrate(("a", "b"), log_evidence[:0], log_evidence[:0], truth[:0]).temperature == pytest.approx(
         1.0, abs=0.05
     )
+
+
+def test_the_least_score_of_a_set_is_where_its_p_value_passes():
+    own = np.sort(np.random.default_rng(4).random(57))
+    calibration = Calibration(("a", "b", "c"), (own, own[:9], np.empty(0)))
+    for confidence in (0.8, 0.95, 0.99):
+        least = calibration.least_scores(confidence)
+        for c, low in enumerate(least):
+            scores = np.full((2, 3), low)
+            scores[0, c] -= 1e-9
+            below, at = calibration.p_values(scores)[:, c] > 1.0 - confidence + 1e-8
+            if low == 0.0:
+                assert below and at  # too few to leave anything out
+            elif c < 2:
+                assert not below and at
+            else:
+                assert low == pytest.approx(1.0 - confidence)

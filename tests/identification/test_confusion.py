@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pbrdf.errors import FitError
-from pbrdf.identification.confusion import NONE, confusion
+from pbrdf.identification.confusion import NONE, confusion, table_of
 from pbrdf.identification.identify import Candidate, Identification
 from pbrdf.identification.library import Library, bundled_library
 
@@ -44,9 +44,22 @@ def test_counts_coverage_and_sizes():
     assert table.reliability.count.sum() == 4  # the unknown says nothing of the probabilities
 
 
+def test_of_plain_arrays():
+    p = np.array([[0.5, 0.01, 0.01], [0.5, 0.6, 0.01], [0.01, 0.02, 0.01], [0.2, 0.01, 0.9]])
+    share = np.array([[0.9, 0.05, 0.05], [0.3, 0.7, 0.0], [0.1, 0.8, 0.1], [0.4, 0.3, 0.3]])
+    table = table_of("abc", np.array([0, 1, 1, 2]), share, p > 0.05, 0.95)
+    assert table.counts.tolist() == [[1, 0, 0, 0], [0, 1, 0, 1], [1, 0, 0, 0]]
+    assert table.accuracy == pytest.approx(0.5)
+    assert table.reliability.right == pytest.approx(0.75)  # of the probabilities, whatever the sets say
+    assert table.coverage == pytest.approx([1.0, 0.5, 1.0])
+    assert table.held == pytest.approx(0.75)
+    assert table_of("abc", np.array([3, 0]), share[:2], p[:2] > 0.05, 0.95, ["x"]).truth == ("a", "x")
+
+
 def test_only_unknown_materials():
     table = confusion([found([0.5, 0.3, 0.2], [])], ["unknown"])
     assert table.reliability is None
+    assert np.isnan(table.held)
     assert table.accuracy == 1.0
 
 

@@ -7,7 +7,7 @@ import pytest
 
 import pbrdf
 from pbrdf.errors import FitError
-from pbrdf.identification.identify import calibrate_library, identify, unknown_gain
+from pbrdf.identification.identify import identify, unknown_gain
 from pbrdf.identification.library import Library, bundled_library
 
 LIBRARY = bundled_library()
@@ -67,30 +67,9 @@ def test_scale_of_the_data():
     assert unknown_gain(pbrdf.open_experiment("white"))
 
 
-def test_calibrated_sets_hold_the_true_material_where_the_stated_noise_is_wrong():
-    """Noise three times as large as stated: the sets by χ² lose the true paint, the calibrated ones do not."""
-    paint = pbrdf.load_paint("matte-white-thin")
-    library = Library((LIBRARY["matte-white-thin"],))
-
-    def batch(begin, count):
-        data = [measurement(paint, seed=s, noise=0.03) for s in range(begin, begin + count)]
-        return [d.assign({f"{n}_std": d[f"{n}_std"] / 3.0 for n in "IQU"}) for d in data]
-
-    calibrated = calibrate_library(library, [("matte-white-thin", d) for d in batch(0, 60)])
-    test = batch(1000, 40)
-    by_chi2 = np.mean([identify(d, library).materials != [] for d in test])
-    held = np.mean([identify(d, calibrated).materials != [] for d in test])
-    assert by_chi2 < 0.5
-    assert held > 0.8
-
-
 def test_what_cannot_be():
     data = measurement(pbrdf.load_paint("white"))
     with pytest.raises(FitError, match="the library has no material"):
         identify(data, Library(()))
     with pytest.raises(FitError, match="confidence=95"):
         identify(data, LIBRARY, confidence=95)
-    with pytest.raises(FitError, match="no labelled measurements"):
-        calibrate_library(LIBRARY, [])
-    with pytest.raises(FitError, match="has no material 'gloss'"):
-        calibrate_library(LIBRARY, [("gloss", data)])

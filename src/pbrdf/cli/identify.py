@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -13,21 +12,36 @@ import typer
 
 from pbrdf.cli.command_line import command_line
 from pbrdf.cli.console import output_console, progress_bar, warn
-from pbrdf.cli.options import Backend, noise_option, output_option, quiet_option, with_reading_options
+from pbrdf.cli.labels import read_labelled, read_pixel_labels
+from pbrdf.cli.options import (
+    Backend,
+    library_option,
+    noise_option,
+    output_option,
+    quiet_option,
+    with_reading_options,
+)
 from pbrdf.cli.reading import Reading
-from pbrdf.cli.specimens import BUNDLED, open_library, open_measurement, open_pixels
+from pbrdf.cli.specimens import (
+    BUNDLED,
+    library_file,
+    open_compared,
+    open_library,
+    open_parameters,
+    open_pixels,
+)
 from pbrdf.cli.values import numbers
 from pbrdf.errors import DataError, FitError, PbrdfError
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from pbrdf.identification.identify import Identification
     from pbrdf.identification.library import Library
+    from pbrdf.identification.telling_apart import NextMeasurement
 
 __all__ = ["identify"]
 
-#: Columns of a table of labelled measurements.
-_COLUMNS = ("file", "material")
 _GAINS = {"known": False, "unknown": True}
 
 
@@ -44,10 +58,7 @@ def identify(
     ] = None,
     *,
     reading: Reading,
-    library: Annotated[
-        Path | None,
-        typer.Option(help="The library's file, see `pbrdf library`.", metavar="FILE", show_default=BUNDLED),
-    ] = None,
+    library: Annotated[Path | None, library_option()] = None,
     confidence: Annotated[
         float, typer.Option(help="How often the set is to hold the true material, between 0 and 1.")
     ] = 0.95,
@@ -86,12 +97,28 @@ def identify(
         float,
         typer.Option(help="Maps: smooth over so many pixels first, where materials fill regions.", min=0.0),
     ] = 0.0,
+    following: Annotated[
+        bool,
+        typer.Option(
+            "--next/--no-next",
+            help="Where several materials remain: say which measurement would tell them apart best.",
+        ),
+    ] = True,
     calibrate: Annotated[
         Path | None,
         typer.Option(
             help="Calibrate with measurements of known materials instead: a CSV table with the columns file and "
             "material. The library's file gets the calibration, or, with --output, FOLDER/library.json.",
             metavar="LABELLED.csv",
+        ),
+    ] = None,
+    labelled: Annotated[
+        Path | None,
+        typer.Option(
+            help="Judge the library as it is by known materials. In place of DATA: a CSV table with the columns file "
+            "and material. With a map: the materials of its pixels, as names, or numbers from 1 in the library's "
+            "order: netCDF, NPY, a picture or regions.",
+            metavar="FILE",
         ),
     ] = None,
     output: Annotated[
@@ -118,18 +145,32 @@ def identify(
     With your own: `pbrdf identify panel.csv --library paints.json --noise 1% -o panel-material`
 
     So that sets hold what they say: `pbrdf identify --calibrate labelled.csv --library paints.json`
+
+    Whether they do: `pbrdf identify --labelled others.csv --library paints.json`
     """
     from pbrdf.files.atomic import require_writable_folder
     from pbrdf.identification.identify import check_request, shares
     from pbrdf.report.style import FIGURE_FORMATS, leave_out_help_texts
 
     sources = list(data or ())
-    if not sources and calibrate is None:
-        raise PbrdfError("name the data to identify, or a table of labelled measurements with --calibrate")
+    if not sources and calibrate is None and labelled is None:
+        raise PbrdfError(
+            "name the data to identify, or a table of labelled measurements with --calibrate or --labelled"
+        )
     if sources and calibrate is not None:
         raise PbrdfError(
             f"--calibrate takes its data from {calibrate}: leave {sources[0]} out, and identify it afterwards"
         )
+    if calibrate is not None and labelled is not None:
+        raise PbrdfError(
+            "--labelled: --calibrate judges its own measurements, each by the others; judge others afterwards"
+        )
+    if labelled is not None and len(sources) > 1:
+        raise PbrdfError(
+            f"--labelled {labelled} is of one map, and there are {len(sources)}: give one after the other"
+        )
+    if smoothing and not sources:
+        raise PbrdfError("--smoothing is for maps: leave it out")
     if figure_format not in FIGURE_FORMATS:
         raise PbrdfError(f"--figure-format {figure_format!r}: choose one of {', '.join(FIGURE_FORMATS)}")
     if gain is not None and gain not in _GAINS:
@@ -138,8 +179,8 @@ def identify(
         raise PbrdfError("--angle 0: leave it out where the angle is exact")
     common = numbers(prior or (), "--prior", "white=0.5")
     folders = _folders(sources, output)
-    opened = open_library(library)
-    name = str(library or BUNDLED)
+    file = library_file(library)
+    opened, name = open_library(file), str(file or BUNDLED)
     try:
         check_request(opened, confidence)
         shares(opened, common)
@@ -178,9 +219,14 @@ def identify(
         settings,
         figure_format if figures else None,
         quiet,
+        following,
+        labelled,
     )
     if calibrate is not None:
-        _calibrate(request, calibrate, library, output)
+        _calibrate(request, calibrate, file, output)
+        return
+    if labelled is not None and not sources:
+        _judge(request, labelled, output)
         return
     for number, source in enumerate(sources):
         into = folders[number] if folders else None
@@ -207,32 +253,56 @@ class _Request:
     settings: dict[str, Any]
     drawn: str | None
     quiet: bool
+    following: bool
+    labelled: Path | None
 
 
 def _one(request: _Request, source: str, folder: Path | None) -> None:
     """Identify one measurement."""
     from pbrdf.files.digest import sha256_of
     from pbrdf.identification.identify import identify as identify_dataset
+    from pbrdf.identification.identify_fit import identify_fit
     from pbrdf.report.identification.folder import write_identification
     from pbrdf.report.identification.subject import Identified
     from pbrdf.report.identification.summary import print_summary
 
     if request.smoothing:
         raise PbrdfError(f"--smoothing is for maps, and {source} is one measurement: leave it out")
-    measured = open_measurement(source, request.reading)
-    found = _told(
-        source,
-        lambda: identify_dataset(
-            measured.dataset,
-            request.library,
-            confidence=request.confidence,
-            prior=request.prior,
-            **request.asked,
-        ),
-    )
-    digest = sha256_of(Path(source)) if measured.fit is None else ""
+    if request.labelled is not None:
+        raise PbrdfError(
+            f"--labelled {request.labelled}: {source} is one measurement; name it in a table, file,material, and leave "
+            "it out here"
+        )
+    options = {"confidence": request.confidence, "prior": request.prior, **request.asked}
+    fitted = open_parameters(source, request.reading)
+    if fitted is not None and (
+        given := [f"--{name}" for name, value in request.asked.items() if value is not None]
+    ):
+        raise PbrdfError(
+            f"{', '.join(given)}: {source} holds fitted parameters without their data, which need none: leave it out"
+        )
+    measured = None if fitted is not None else open_compared(source, request.reading)
+    one = measured.fit if measured is not None and measured.fit is not None else fitted
+    if one is not None:
+        found = _told(source, lambda: identify_fit(one, request.library, **options))
+    else:
+        assert measured is not None
+        found = _told(source, lambda: identify_dataset(measured.dataset, request.library, **options))
+    following = None
+    remain = request.following and len(found.materials) > 1 and found.data is not None
+    if remain and not (request.quiet and folder is None):
+        following = _next(source, found)
     report = Identified(
-        found, measured.dataset, source, request.name, request.prior, request.settings, command_line(), digest
+        found,
+        None if measured is None else measured.dataset,
+        source,
+        request.name,
+        request.prior,
+        request.settings,
+        command_line(),
+        sha256_of(Path(source)) if one is None else "",
+        following,
+        fitted,
     )
     written = [] if folder is None else write_identification(report, folder, figure_format=request.drawn)
     if request.quiet:
@@ -242,10 +312,22 @@ def _one(request: _Request, source: str, folder: Path | None) -> None:
     _say_written(folder, written)
 
 
+def _next(source: str, found: Identification) -> NextMeasurement | None:
+    """Which reading would tell the materials apart; an answer is not lost where that cannot be told."""
+    from pbrdf.identification.telling_apart import next_measurement
+
+    try:
+        return next_measurement(found)
+    except FitError as error:
+        warn(f"{source}: what to measure next: {error}")
+        return None
+
+
 def _every_pixel(request: _Request, source: str, pixels: xr.Dataset, folder: Path | None) -> None:
     """Identify every pixel of a map."""
     from pbrdf.identification.class_map import identify_map
     from pbrdf.identification.identify import unknown_gain
+    from pbrdf.identification.labelled_pixels import judge_pixels
     from pbrdf.report.identification.classified import Classified
     from pbrdf.report.identification.folder import write_classes
     from pbrdf.report.identification.summary import print_classes
@@ -261,6 +343,8 @@ def _every_pixel(request: _Request, source: str, pixels: xr.Dataset, folder: Pat
         raise PbrdfError(
             f"--gain and --noise: {source} holds fitted parameters, which need neither: leave them out"
         )
+    given_labels = request.labelled
+    labels = None if given_labels is None else read_pixel_labels("--labelled", given_labels, pixels)
     with progress_bar(f"Identifying the pixels of {source}", request.quiet) as progress:
         found = _told(
             source,
@@ -275,6 +359,9 @@ def _every_pixel(request: _Request, source: str, pixels: xr.Dataset, folder: Pat
                 progress=progress,
             ),
         )
+    judged = (
+        None if labels is None else _told(f"--labelled {given_labels}", lambda: judge_pixels(found, labels))
+    )
     free = None if fitted else unknown_gain(pixels) if gain is None else gain
     report = Classified(
         found,
@@ -286,6 +373,8 @@ def _every_pixel(request: _Request, source: str, pixels: xr.Dataset, folder: Pat
         request.prior,
         request.settings,
         command_line(),
+        judged,
+        "" if given_labels is None else str(given_labels),
     )
     written = [] if folder is None else write_classes(report, folder, figure_format=request.drawn)
     if request.quiet:
@@ -305,10 +394,13 @@ def _largest(report: Any) -> str:
 
 def _calibrate(request: _Request, table: Path, file: Path | None, output: Path | None) -> None:
     """Calibrate a library, and report how honest it is."""
+    import numpy as np
+
     from pbrdf.files.atomic import require_writable_folder
     from pbrdf.identification.conformal import calibrate
+    from pbrdf.identification.confusion import table_of
     from pbrdf.identification.cross_check import cross_checked
-    from pbrdf.identification.identify import labelled_evidence
+    from pbrdf.identification.labelled import labelled_evidence
     from pbrdf.identification.library import Library
     from pbrdf.report.identification.calibrated import Calibrated
     from pbrdf.report.identification.folder import LIBRARY, write_calibration
@@ -319,17 +411,18 @@ def _calibrate(request: _Request, table: Path, file: Path | None, output: Path |
     require_writable_folder(folder)
     within = file is None or output is not None
     target = folder / LIBRARY if file is None or within else file
-    labelled = _labelled(table, library, request.reading)
+    labelled = read_labelled("--calibrate", table, library, request.reading, strangers=False)
+    truth = np.array([library.names.index(name) for name, _ in labelled])
     with progress_bar(f"Calibrating with {table}", request.quiet) as progress:
-        rows, scores, truth = _told(
+        rows, scores = _told(
             str(table), lambda: labelled_evidence(library, labelled, progress=progress, **request.asked)
         )
     words = f"{len(labelled)} of {table.name}"
     made = Library(library.materials, calibrate(library.names, rows, scores, truth, words))
-    judged = cross_checked(library.names, rows, scores, truth)
-    report = Calibrated(
-        made, judged, request.confidence, str(table), str(target), request.settings, command_line()
-    )
+    probability, p_value = cross_checked(library.names, rows, scores, truth)
+    at = request.confidence
+    judged = table_of(library.names, truth, probability, p_value > 1.0 - at, at)
+    report = Calibrated(made, judged, str(table), str(target), request.settings, command_line())
     written = write_calibration(report, folder, figure_format=request.drawn, with_library=within)
     if not within:
         made.write(target)
@@ -343,36 +436,39 @@ def _calibrate(request: _Request, table: Path, file: Path | None, output: Path |
     )
 
 
-def _labelled(table: Path, library: Library, reading: Reading) -> list[tuple[str, xr.Dataset]]:
-    """Materials and data of a table of labels; files are looked for beside it."""
-    from pbrdf.files.text import read_bytes, utf8
+def _judge(request: _Request, table: Path, folder: Path | None) -> None:
+    """Report how a library, as it is, judges measurements of known materials."""
+    from pbrdf.files.atomic import require_writable_folder
+    from pbrdf.identification.labelled import judge_labelled
+    from pbrdf.report.identification.confusion_table import confusion_sentence
+    from pbrdf.report.identification.folder import write_labelled
+    from pbrdf.report.identification.labelled import LabelledReport
+    from pbrdf.report.identification.summary import print_labelled
 
-    rows = csv.DictReader(utf8(table, read_bytes(table)).decode().splitlines(), skipinitialspace=True)
-    columns = [str(column).strip() for column in rows.fieldnames or ()]
-    if not set(_COLUMNS) <= set(columns):
-        raise DataError(
-            f"--calibrate {table}: its columns must be file,material; they are {', '.join(columns)}"
+    if folder is not None:
+        require_writable_folder(folder)
+    labelled = read_labelled("--labelled", table, request.library, request.reading, strangers=True)
+    with progress_bar(f"Identifying those of {table}", request.quiet) as progress:
+        found = _told(
+            str(table),
+            lambda: judge_labelled(
+                request.library,
+                labelled,
+                confidence=request.confidence,
+                prior=request.prior,
+                progress=progress,
+                **request.asked,
+            ),
         )
-    rows.fieldnames = columns
-    labelled = []
-    for row in rows:
-        source, material = ((row[column] or "").strip() for column in _COLUMNS)
-        at = f"--calibrate {table}: line {rows.line_num}"
-        if not source or not material:
-            raise DataError(f"{at}: file or material is missing")
-        if material not in library.names:
-            raise DataError(
-                f"{at}: the library has no material {material!r}; it has {', '.join(library.names)}"
-            )
-        beside = table.parent / source
-        try:
-            measured = open_measurement(str(beside) if beside.exists() else source, reading)
-        except PbrdfError as error:
-            raise DataError(f"{at}: {error}") from error
-        labelled.append((material, measured.dataset))
-    if not labelled:
-        raise DataError(f"--calibrate {table}: there is no row below the names of the columns")
-    return labelled
+    report = LabelledReport(
+        found, str(table), request.library, request.name, request.prior, request.settings, command_line()
+    )
+    written = [] if folder is None else write_labelled(report, folder, figure_format=request.drawn)
+    if request.quiet:
+        print(folder if folder is not None else f"{table}: {confusion_sentence(found, 'measurements')}")
+        return
+    print_labelled(report, output_console())
+    _say_written(folder, written)
 
 
 def _told(source: str, work: Callable[[], Any]) -> Any:

@@ -232,6 +232,7 @@ def map_pixels(
         set_backend(backend)
     if polarimeter is not None:
         stokes = _reduced(stokes, polarimeter, angles, target, quiet)
+    from pbrdf.instruments.pixel_geometry.labels import read_labels
     from pbrdf.inversion.map_store import open_map
     from pbrdf.inversion.map_store.map_store import MapStore
     from pbrdf.inversion.map_store.picture_source import PictureSource
@@ -254,6 +255,8 @@ def map_pixels(
     else:
         picture = report / _QUICK_LOOK if figures else None
         grid = _units(outline, fit.dims, unit, memory)
+        if unit is not None and target.exists():
+            _require_units(target, MapStore(target, fit, source).grid, grid)
         if not _fill(target, fit, source, grid, place, scheduler, picture, quiet):
             if quiet:
                 print(target)
@@ -266,6 +269,7 @@ def map_pixels(
         {"model": model, **arguments, "geometry": geometry, "counts per brdf": counts_per_brdf},
         command_line(),
         simulated=bool(outline.attrs.get("simulated")),
+        labels=None if labels is None else read_labels(labels, outline.sizes["y"], outline.sizes["x"]),
     )
     _report(subject, report, formats, figures, quiet)
 
@@ -444,6 +448,16 @@ def _units(outline: xr.Dataset, dims: Sequence[str], side: int | None, memory: i
         if set(dims) & set(map(str, variable.dims))
     )
     return UnitGrid.of(sizes, pixels=max(min(memory // (_BYTES * numbers), UNIT), 1))
+
+
+def _require_units(target: Path, begun: UnitGrid, asked: UnitGrid) -> None:
+    """Raise if units of another size are asked for than a map was begun with: they stay as they are."""
+    if begun.shard != asked.shard:
+        cut, wanted = (" × ".join(map(str, grid.shard)) for grid in (begun, asked))
+        raise PbrdfError(
+            f"--unit: {target} was begun in units of {cut} pixels, and goes on in these; {wanted} are asked for: leave "
+            "--unit out, or choose another folder"
+        )
 
 
 def _report(subject: MapReport, folder: Path, formats: Sequence[str], figures: bool, quiet: bool) -> None:

@@ -30,6 +30,7 @@ __all__ = [
     "angles_option",
     "data_argument",
     "instrument_option",
+    "library_option",
     "model_argument",
     "noise_option",
     "output_option",
@@ -137,6 +138,18 @@ def regions_option(what: str) -> Any:
 def roi_option(help: str) -> Any:
     """``--roi``: a region in one text."""
     return typer.Option(help=help, metavar="NAME=X0:X1,Y0:Y1")
+
+
+def library_option(*, changed: bool = False) -> Any:
+    """``--library``: a file of materials that is read, or changed, which the bundled paints cannot be."""
+    shown = "library.json in this folder" + ("" if changed else ", else the bundled paints")
+    return typer.Option(
+        "--library",
+        "-l",
+        help="File of the library, see `pbrdf library`.",
+        metavar="FILE",
+        show_default=shown,
+    )
 
 
 def source_radius_option(more: str = "") -> Any:

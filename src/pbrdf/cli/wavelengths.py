@@ -1,4 +1,4 @@
-"""Data of many wavelengths, before a model is fitted to them."""
+"""Data of many wavelengths, before a model is fitted to them or a material looked for."""
 
 from __future__ import annotations
 
@@ -12,14 +12,21 @@ if TYPE_CHECKING:
 
 __all__ = ["MANY", "require_choice"]
 
+#: What becomes of the data if nothing is chosen, in words.
+_FITTED = "one set of parameters for all would be fitted"
 #: From so many wavelengths on, one set of parameters for all is hardly meant: it has to be said.
 MANY = 6
 
 
 def require_choice(
-    dataset: xr.Dataset, reading: Reading, source: str, *, by_wavelength: bool | None = None
+    dataset: xr.Dataset,
+    reading: Reading,
+    source: str,
+    *,
+    by_wavelength: bool | None = None,
+    otherwise: str = _FITTED,
 ) -> None:
-    """Raise, with the choices, if a file of many wavelengths is to be fitted and nothing says how.
+    """Raise, with the choices, if a file of many wavelengths is to be fitted or identified and nothing says how.
 
     Parameters
     ----------
@@ -31,6 +38,8 @@ def require_choice(
         Name of the file.
     by_wavelength
         Whether a parameter is free for each wavelength; None where the command has no such option.
+    otherwise
+        What would become of the data, in words.
 
     Raises
     ------
@@ -51,9 +60,6 @@ def require_choice(
     low, high = np.floor(known[0]), np.ceil(known[-1])
     split = "" if by_wavelength is None else "; --split a=wavelength for a of each and the rest shared"
     raise DataError(
-        f"{source}: there are {known.size} wavelengths, {known[0]:g} … {known[-1]:g} nm, and one set of "
-        "parameters for all "
-        f"would be fitted; choose --wavelength {middle:g} for one{split}; or --select "
-        f"wavelength={low:g}:{high:g} if one "
-        "set for these is meant"
+        f"{source}: there are {known.size} wavelengths, {known[0]:g} … {known[-1]:g} nm, and {otherwise}; choose "
+        f"--wavelength {middle:g} for one{split}; or --select wavelength={low:g}:{high:g} if one set for these is meant"
     )

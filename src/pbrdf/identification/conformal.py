@@ -12,6 +12,7 @@ compared between measurements of different numbers of geometries.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -100,6 +101,15 @@ class Calibration:
                 result[:, c] = scores[:, c]
         return result
 
+    def least_scores(self, confidence: float) -> np.ndarray:
+        """Smallest scores with which a set of this confidence still holds each material, (C,); 0: it always does."""
+        least = np.full(len(self.scores), 1.0 - confidence)
+        for c, own in enumerate(self.scores):
+            if len(own):
+                rank = math.floor(round((1.0 - confidence) * (len(own) + 1), 9))
+                least[c] = own[rank - 1] if rank else 0.0
+        return least
+
 
 def calibrate(
     names: Sequence[str],
@@ -157,6 +167,12 @@ class Reliability:
         filled = self.count > 0
         gap = np.abs(self.confidence[filled] - self.accuracy[filled])
         return float((gap * self.count[filled]).sum() / max(int(self.count.sum()), 1))
+
+    @property
+    def right(self) -> float:
+        """Part of all measurements whose most probable material is the true one."""
+        filled = self.count > 0
+        return float((self.accuracy[filled] * self.count[filled]).sum() / max(int(self.count.sum()), 1))
 
 
 def reliability(probability: np.ndarray, truth: np.ndarray, bins: int = BINS) -> Reliability:

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pbrdf.data.schema import NORMALISED, is_ratio
 from pbrdf.data.validation import validate
 from pbrdf.errors import FitError
-from pbrdf.identification.conformal import Calibration, calibrate, nominal, probabilities
+from pbrdf.identification.conformal import Calibration, nominal, probabilities
 from pbrdf.identification.evidence import Evidence, evidence
 from pbrdf.identification.library import Library
 from pbrdf.inversion.noise import Noise, parse_noise
 from pbrdf.inversion.observations import Observations
+from pbrdf.presentation import presenter_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -23,14 +24,18 @@ if TYPE_CHECKING:
 __all__ = [
     "Candidate",
     "Identification",
-    "calibrate_library",
+    "arbitrary_scale",
     "check_request",
+    "identification_of",
     "identify",
     "identify_observations",
-    "labelled_evidence",
     "shares",
     "unknown_gain",
 ]
+
+
+#: p-value by χ² below which chance is no explanation any more: a measurement is then none of the material's.
+FAR = 1e-3
 
 
 @dataclass(frozen=True)
@@ -61,9 +66,11 @@ class Candidate:
     accepted: bool
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Identification:
     """What a measurement says about the materials of a library.
+
+    ``print(identification)`` shows what the command ``pbrdf identify`` prints; a notebook shows a table.
 
     Attributes
     ----------
@@ -82,11 +89,15 @@ class Identification:
     calibration
         In words, what the p-values rest on.
     data
-        The measurement as it was compared.
+        The measurement as it was compared; None where fitted parameters were.
     library
-        The library.
+        The library, with the calibration that was used.
     temperature
         What logarithms of likelihoods were divided by.
+    prior
+        How common the materials were taken to be, by name; empty for all alike.
+    dataset
+        The data set that was identified, None where there is none.
     """
 
     candidates: tuple[Candidate, ...]
@@ -96,9 +107,27 @@ class Identification:
     angle: float | None
     noise: str
     calibration: str
-    data: Observations = field(repr=False)
+    data: Observations | None = field(repr=False)
     library: Library = field(repr=False)
     temperature: float = 1.0
+    prior: Mapping[str, float] = field(default_factory=dict)
+    dataset: xr.Dataset | None = field(default=None, compare=False)
+
+    def __repr__(self) -> str:
+        names = ", ".join(self.materials) or "none of these"
+        return (
+            f"<Identification: {names} at {100.0 * self.confidence:g} %, {len(self.candidates)} candidates>"
+        )
+
+    def __str__(self) -> str:
+        return self.summary().rstrip()
+
+    def _repr_html_(self) -> str:
+        return str(presenter_of("identification").html(self))
+
+    def summary(self) -> str:
+        """What ``pbrdf identify`` prints: the set, the candidates, what the answer rests on."""
+        return str(presenter_of("identification").summary(self))
 
     @property
     def materials(self) -> list[str]:
@@ -110,6 +139,17 @@ class Identification:
         """Whether the measurement is like none of the library's materials."""
         return not self.materials
 
+    @property
+    def far_from_all(self) -> bool:
+        """Whether it is so unlike every material that probabilities among them say nothing of the sample.
+
+        They add up to 1 whatever was measured. Where even the likeliest specimen of every material is beyond chance,
+        their ratios are those of the tails of normal distributions, at which nobody has ever looked.
+        """
+        distance = np.array([[candidate.distance for candidate in self.candidates]])
+        by_chance = nominal(distance, np.array([self.degrees_of_freedom]))
+        return self.none_of_these and bool((by_chance < FAR).all())
+
     def __getitem__(self, name: str) -> Candidate:
         for candidate in self.candidates:
             if candidate.name == name:
@@ -119,12 +159,15 @@ class Identification:
 
 def unknown_gain(dataset: xr.Dataset) -> bool:
     """Whether a factor of the intensities is not known: their scale is arbitrary, or they are radiances or counts."""
-    quantity = dataset.attrs["quantity"]
+    return arbitrary_scale(dataset.attrs["quantity"], dataset.attrs.get("scale"))
+
+
+def arbitrary_scale(quantity: str | None, scale: str | None) -> bool:
+    """Whether data of this quantity, with what is stated of their scale, have an unknown factor."""
     if quantity == NORMALISED:
         return False
-    stated = dataset.attrs.get("scale")
-    if stated is not None:
-        return bool(stated == "arbitrary")
+    if scale is not None:
+        return scale == "arbitrary"
     return quantity in ("radiance", "dn")
 
 
@@ -169,7 +212,7 @@ def identify(
     if isinstance(noise, str):
         noise = parse_noise(noise)
     observed = Observations.from_dataset(dataset, noise)
-    return identify_observations(
+    found = identify_observations(
         observed,
         library,
         confidence=confidence,
@@ -179,6 +222,7 @@ def identify(
         prior=prior,
         calibration=calibration,
     )
+    return replace(found, dataset=dataset)
 
 
 def identify_observations(
@@ -195,7 +239,32 @@ def identify_observations(
     """Identify the material of plain arrays; ``noise`` in words, all else as for :func:`identify`."""
     check_request(library, confidence)
     gain = gain and not all(is_ratio(channel) for channel in observed.channels)
-    found = evidence(library.materials, [observed], gain=gain, angle=angle)
+    return identification_of(
+        evidence(library.materials, [observed], gain=gain, angle=angle),
+        library,
+        confidence=confidence,
+        gain=gain,
+        angle=angle,
+        noise=noise,
+        prior=prior,
+        calibration=calibration,
+        data=observed,
+    )
+
+
+def identification_of(
+    found: Evidence,
+    library: Library,
+    *,
+    confidence: float,
+    gain: bool,
+    angle: float | None,
+    noise: str,
+    prior: Mapping[str, float] | None,
+    calibration: Calibration | None,
+    data: Observations | None,
+) -> Identification:
+    """Set and probabilities from what one measurement says of each material; all else as :func:`identify` has it."""
     used = calibration or library.calibration
     words = "χ² of a linear model with Gaussian scatter; no calibration"
     if used is not None:
@@ -208,95 +277,11 @@ def identify_observations(
         angle=angle,
         noise=noise,
         calibration=words,
-        data=observed,
-        library=library,
+        data=data,
+        library=library if calibration is None else replace(library, calibration=calibration),
         temperature=1.0 if used is None else used.temperature,
+        prior=dict(prior or {}),
     )
-
-
-def calibrate_library(
-    library: Library,
-    labelled: Sequence[tuple[str, xr.Dataset]],
-    *,
-    gain: bool | None = None,
-    angle: float | None = None,
-    noise: Noise | str | None = None,
-    measurements: str = "",
-) -> Library:
-    """The library with a calibration by measurements whose materials are known.
-
-    Parameters
-    ----------
-    library
-        The materials.
-    labelled
-        Pairs of a material's name and a data set.
-    gain, angle, noise
-        As for :func:`identify`: the calibration holds for measurements that are treated alike.
-    measurements
-        Where they come from, in words.
-
-    Raises
-    ------
-    FitError
-        If a label is none of the library's materials, or there are no measurements.
-    """
-    found = labelled_evidence(library, labelled, gain=gain, angle=angle, noise=noise)
-    return Library(library.materials, calibrate(library.names, *found, measurements))
-
-
-def labelled_evidence(
-    library: Library,
-    labelled: Sequence[tuple[str, xr.Dataset]],
-    *,
-    gain: bool | None = None,
-    angle: float | None = None,
-    noise: Noise | str | None = None,
-    progress: Callable[[int, int], None] | None = None,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """What a calibration rests on: how well each material explains measurements whose materials are known.
-
-    Parameters
-    ----------
-    library, labelled, gain, angle, noise
-        See :func:`calibrate_library`.
-    progress
-        Called with the number of finished measurements and of all.
-
-    Returns
-    -------
-    log_evidence, scores, truth
-        Shapes (B, C), (B, C) and (B,), as of :func:`pbrdf.identification.conformal.calibrate`.
-
-    Raises
-    ------
-    FitError, DataError
-        If a label is none of the library's materials, there are no measurements, or one is not valid.
-    """
-    if not labelled:
-        raise FitError("calibration: there are no labelled measurements")
-    if isinstance(noise, str):
-        noise = parse_noise(noise)
-    truth = np.array([library.names.index(library[name].name) for name, _ in labelled])
-    # those of one form are looked at together
-    alike: dict[Any, list[tuple[int, Observations]]] = {}
-    for number, (_, dataset) in enumerate(labelled):
-        validate(dataset)
-        observed = Observations.from_dataset(dataset, noise)
-        free = unknown_gain(dataset) if gain is None else gain
-        form = observed.channels, observed.values.shape, observed.illumination, free
-        alike.setdefault(form, []).append((number, observed))
-    log_evidence = np.empty((len(labelled), len(library.materials)))
-    scores, done = np.empty_like(log_evidence), 0
-    for (*_, free), members in alike.items():
-        at = [number for number, _ in members]
-        found = evidence(library.materials, [one for _, one in members], gain=free, angle=angle)
-        log_evidence[at] = found.log_evidence
-        scores[at] = nominal(found.distance, found.degrees_of_freedom)
-        done += len(members)
-        if progress is not None:
-            progress(done, len(labelled))
-    return log_evidence, scores, truth
 
 
 def check_request(library: Library, confidence: float) -> None:

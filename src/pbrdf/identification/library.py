@@ -7,12 +7,15 @@
                     "unknowns": ["log sigma", "n", ...], "mean": [...], "covariance": [[...], ...],
                     "lower": [...], "upper": [...], "fixed": {"kappa": 0.0},
                     "specimens": 12, "scatter": "estimated", "simulated": false, "wavelength_nm": 550.0,
-                    "provenance": ["fitted to panel-1.csv", ...]}],
+                    "provenance": ["fitted to panel-1.csv", ...],
+                    "fits": {"reduced_chi2": 1.1, "missed": 0.02, "cautions": []}}],
      "calibration": {"names": [...], "scores": [[...], ...], "temperature": 1.0, "measurements": "..."}}
 
 ``mean`` and ``covariance`` are those of the unknowns: of the logarithm where it says ``log NAME``, of the square where
 ``square NAME``, else of the parameter itself in its unit; ``lower`` and ``upper`` bound the parameters of a specimen.
-``wavelength_nm`` is null where it is not known, ``calibration`` where there is none.
+``wavelength_nm`` is null where it is not known, ``calibration`` where there is none. ``fits`` says what the
+specimens' fits are worth (:class:`~pbrdf.identification.specimen_fits.SpecimenFits`), null where a number is not known;
+files may be without it.
 """
 
 from __future__ import annotations
@@ -33,6 +36,7 @@ from pbrdf.files.atomic import atomic_file
 from pbrdf.files.text import read_bytes, utf8
 from pbrdf.identification.conformal import Calibration
 from pbrdf.identification.material import Material, material_from_model
+from pbrdf.identification.specimen_fits import SpecimenFits
 from pbrdf.inversion.problem import Space
 from pbrdf.models import find_model
 from pbrdf.models.parameters import Parameter
@@ -200,9 +204,22 @@ def _described(material: Material) -> dict[str, Any]:
         "specimens": material.specimens,
         "scatter": material.scatter,
         "simulated": material.simulated,
-        "wavelength_nm": None if math.isnan(material.wavelength) else material.wavelength,
+        "wavelength_nm": _or_null(material.wavelength),
         "provenance": list(material.provenance),
+        "fits": {
+            "reduced_chi2": _or_null(material.fits.reduced_chi2),
+            "missed": _or_null(material.fits.missed),
+            "cautions": list(material.fits.cautions),
+        },
     }
+
+
+def _or_null(number: float) -> float | None:
+    return number if math.isfinite(number) else None
+
+
+def _number(stored: Any) -> float:
+    return math.nan if stored is None else float(stored)
 
 
 def _material(described: Mapping[str, Any]) -> Material:
@@ -220,7 +237,7 @@ def _material(described: Mapping[str, Any]) -> Material:
     mean, covariance = (np.array(described[key], dtype=float) for key in ("mean", "covariance"))
     if not (np.isfinite(mean).all() and np.isfinite(covariance).all()):
         raise DataError("mean and covariance must be finite")
-    wavelength = described["wavelength_nm"]
+    fits = described.get("fits", {})
     material = Material(
         name=str(described["name"]),
         space=space,
@@ -229,8 +246,13 @@ def _material(described: Mapping[str, Any]) -> Material:
         specimens=int(described["specimens"]),
         scatter=str(described["scatter"]),
         simulated=bool(described["simulated"]),
-        wavelength=math.nan if wavelength is None else float(wavelength),
+        wavelength=_number(described["wavelength_nm"]),
         provenance=tuple(map(str, described["provenance"])),
+        fits=SpecimenFits(
+            _number(fits.get("reduced_chi2")),
+            _number(fits.get("missed")),
+            tuple(map(str, fits.get("cautions", ()))),
+        ),
     )
     _ = material.model  # raises ModelError where the mean is outside the model's domain
     return material

@@ -20,6 +20,7 @@ import numpy as np
 
 from pbrdf.errors import FitError
 from pbrdf.identification.shrinkage import ledoit_wolf
+from pbrdf.identification.specimen_fits import SpecimenFits
 from pbrdf.inversion.optimum import Optimum
 from pbrdf.inversion.problem import Space
 from pbrdf.inversion.statistics import covariance as inverse_of
@@ -59,6 +60,8 @@ class Material:
         In nm; NaN where it is not known.
     provenance
         Sentences: which fits or files it comes from.
+    fits
+        How well the model describes the specimens that were fitted.
     """
 
     name: str
@@ -70,6 +73,7 @@ class Material:
     simulated: bool = False
     wavelength: float = math.nan
     provenance: tuple[str, ...] = field(default=())
+    fits: SpecimenFits = field(default=SpecimenFits())
 
     def __post_init__(self) -> None:
         size = len(self.space.free)
@@ -193,6 +197,7 @@ def material_from_fits(
     simulated: bool = False,
     wavelength: float = math.nan,
     provenance: Sequence[str] = (),
+    labels: Sequence[str] | None = None,
 ) -> Material:
     """A material from fits of its specimens, one fit a specimen.
 
@@ -207,6 +212,8 @@ def material_from_fits(
         more, see :func:`assumed_scatter`.
     simulated, wavelength, provenance
         See :class:`Material`.
+    labels
+        What to call the fits in errors and cautions; None numbers them.
 
     Raises
     ------
@@ -216,16 +223,15 @@ def material_from_fits(
     if not fits:
         raise FitError(f"material {name}: give the fit of at least one specimen")
     first = fits[0].space
+    called = [f"fit {number}" for number in range(1, len(fits) + 1)] if labels is None else labels
     kept = [i for i, term in enumerate(first.terms) if not term.nuisance]
     free = tuple(first.free[i] for i in kept)
-    for number, fit in enumerate(fits, start=1):
+    for label, fit in zip(called, fits, strict=True):
         space = fit.space
         if any(term.split is not None and not term.nuisance for term in space.terms):
-            raise FitError(
-                f"material {name}: fit {number} has parameters of their own for groups or wavelengths"
-            )
+            raise FitError(f"material {name}: {label} has parameters of their own for groups or wavelengths")
         if not fit.settled:
-            raise FitError(f"material {name}: fit {number} stands at no minimum: fit again with more starts")
+            raise FitError(f"material {name}: {label} stands at no minimum: fit again with more starts")
         own = tuple(space.free[i] for i in range(len(space.free)) if not space.terms[i].nuisance)
         same = (space.model, dict(space.options), [p.name for p in own], dict(space.fixed)) == (
             first.model,
@@ -235,7 +241,7 @@ def material_from_fits(
         )
         if not same:
             raise FitError(
-                f"material {name}: fit {number} is of another model, or has other free or fixed parameters than fit 1"
+                f"material {name}: {label} is of another model, or has other free or fixed parameters than {called[0]}"
             )
     estimates, own_spread = [], []
     for fit in fits:
@@ -253,7 +259,18 @@ def material_from_fits(
     mean, cov, source = pooled(np.array(estimates), np.array(own_spread), assumed_scatter(free, scatter))
     free_only = replace(first, free=free, lower=first.lower[kept], upper=first.upper[kept], terms=())
     space = _space(first.model, first.options, free, first.fixed, free_only.to_parameters(mean))
-    return Material(name, space, mean, cov, len(fits), source, simulated, wavelength, tuple(provenance))
+    return Material(
+        name,
+        space,
+        mean,
+        cov,
+        len(fits),
+        source,
+        simulated,
+        wavelength,
+        tuple(provenance),
+        SpecimenFits.of(fits, called),
+    )
 
 
 def pooled(

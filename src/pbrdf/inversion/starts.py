@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-__all__ = ["sobol_starts"]
+__all__ = ["sobol_points", "sobol_starts"]
 
 # Degree, coefficients of the primitive polynomial and initial direction numbers for dimensions 2, 3, …
 # Source: Joe and Kuo, SIAM J. Sci. Comput. 30, 2635 (2008), table new-joe-kuo-6.21201.
@@ -98,16 +98,19 @@ def sobol_starts(lower: np.ndarray, upper: np.ndarray, count: int, seed: int = 0
         Shape (count, P). The points keep a distance of 5 % of the range from the bounds, where gradients of
         bounded parameters vanish.
     """
-    size = len(lower)
+    return lower + (0.05 + 0.9 * sobol_points(len(lower), count, seed)) * (upper - lower)
+
+
+def sobol_points(size: int, count: int, seed: int = 0) -> np.ndarray:
+    """Points of a Sobol sequence with a random digital shift, strictly between 0 and 1, shape (count, size)."""
     if size > len(_DIRECTIONS) + 1:
         from scipy.stats import qmc
 
         sampler = qmc.Sobol(size, scramble=True, rng=np.random.default_rng(seed))
         points = sampler.random_base2(int(np.ceil(np.log2(max(count, 1)))))[:count]
-    else:
-        shift = np.random.default_rng(seed).integers(0, 1 << _BITS, size)
-        points = ((_sobol_integers(size, count) ^ shift) + 0.5) / (1 << _BITS)
-    return lower + (0.05 + 0.9 * points) * (upper - lower)
+        return np.clip(points, 0.5 / (1 << _BITS), 1.0 - 0.5 / (1 << _BITS))
+    shift = np.random.default_rng(seed).integers(0, 1 << _BITS, size)
+    return np.asarray(((_sobol_integers(size, count) ^ shift) + 0.5) / (1 << _BITS))
 
 
 def _sobol_integers(size: int, count: int) -> np.ndarray:

@@ -120,3 +120,21 @@ def test_what_another_program_stores_in_another_form_is_named(tmp_path, change, 
     ds.to_netcdf(tmp_path / "data.nc", engine="h5netcdf")
     with pytest.raises(DataError, match=rf"data\.nc.*{words}"):
         read_netcdf(tmp_path / "data.nc")
+
+
+@pytest.mark.parametrize(
+    ("dims", "name", "words"),
+    [
+        (("y", "x"), "I", "Stokes pictures, whose pixels have no geometry yet: `pbrdf map"),
+        (
+            ("geometry", "sample"),
+            "I",
+            "data of pixels, with sample beside geometry: `pbrdf map` and pbrdf.fit_map",
+        ),
+        (("parameter", "y", "x"), "estimate", "a map of fitted parameters, not measurements: pbrdf.open_map"),
+    ],
+)
+def test_pictures_pixels_and_maps_say_what_takes_them(tmp_path, dims, name, words):
+    xr.Dataset({name: (dims, np.ones((2,) * len(dims)))}).to_netcdf(tmp_path / "a.nc", engine="h5netcdf")
+    with pytest.raises(DataError, match=rf"a\.nc: holds {words}"):
+        read_netcdf(tmp_path / "a.nc")

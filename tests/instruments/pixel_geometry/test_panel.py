@@ -137,3 +137,22 @@ def test_blocks_are_parts_of_the_whole():
     part = panel.pixels(np.arange(7, 19), np.arange(3, 5))
     assert part.identical(whole.isel(y=slice(3, 5), x=slice(7, 19)))
     assert panel.located(blank(20, 30)) == panel
+
+
+def test_angles_that_pictures_have_are_not_replaced():
+    """Stated ones must be theirs; a turn more of an azimuth is none."""
+    angles = {"theta_i": [10.0, 20.0], "theta_r": [5.0, 5.0], "phi": [0.0, 180.0]}
+    pictures = blank(3, 4, series=2).assign_coords({name: ("series", v) for name, v in angles.items()})
+    rest = {"reference_angle": 0.1}
+    with pytest.raises(
+        DataError, match=r"say themselves that theta_i is 10° … 20°, and 30° is stated: leave"
+    ):
+        Panel(theta_i=math.radians(30.0), **rest).located(pictures)
+    with pytest.raises(DataError, match="theta_i is 10° … 20°, and 10° is stated"):
+        Panel(theta_i=math.radians(10.0), **rest).located(pictures)
+    same = Panel(
+        theta_i=np.deg2rad([10.0, 20.0]), theta_r=math.radians(5.0), phi=np.deg2rad([360.0, -180.0]), **rest
+    )
+    assert len(same.located(pictures).theta_i) == 2
+    unknown = pictures.assign_coords(theta_i=("series", [math.nan, math.nan]))
+    assert Panel(theta_i=0.5, **rest).located(unknown).theta_i == (0.5,)

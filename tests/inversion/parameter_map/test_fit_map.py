@@ -257,6 +257,15 @@ def test_a_map_of_nothing(data):
     assert (pbrdf.fit_map(dataset, **FEW)["status"] == PixelStatus.NOT_MEASURED).all()
 
 
+def test_uncertainties_that_are_nowhere_above_0_are_refused(data):
+    """At some values they are left out, see above; nowhere at all is a mistake."""
+    for wrong in (0.0, -1.0):
+        with pytest.raises(
+            pbrdf.DataError, match=r"Q_std is 0 or less at \d+ of \d+ pixels, and nowhere above 0"
+        ):
+            pbrdf.fit_map(data.assign(Q_std=0.0 * data["Q_std"] + wrong), **FEW)
+
+
 def test_what_a_map_says_of_itself(data):
     reports = []
     found = pbrdf.fit_map(data, progress=lambda *n: reports.append(n), **FEW)

@@ -12,18 +12,20 @@ from figure_helpers import legend
 from matplotlib.colors import to_hex
 
 from pbrdf.identification.conformal import calibrate
+from pbrdf.identification.confusion import table_of
 from pbrdf.identification.cross_check import cross_checked
+from pbrdf.identification.labelled_pixels import judge_pixels
 from pbrdf.identification.library import Library, bundled_library
 from pbrdf.report.identification.calibrated import (
     Calibrated,
     calibration_rests_on,
-    fewest_needed,
-    level_of_calibration,
 )
 from pbrdf.report.identification.calibration_figure import confusion_figure, reliability_figure
 from pbrdf.report.identification.class_figure import class_counts, class_figure
-from pbrdf.report.identification.classified import Classified, classes_sentence
+from pbrdf.report.identification.classified import Classified, class_rows, classes_sentence
+from pbrdf.report.identification.confusion_table import level_of_sets
 from pbrdf.report.identification.folder import write_calibration, write_classes
+from pbrdf.report.identification.subject import fewest_needed
 from pbrdf.report.identification.summary import summary_text
 
 LIBRARY = bundled_library()
@@ -60,7 +62,9 @@ def calibrated():
     distance = (x[:, None] - 2.0 * np.arange(5)) ** 2
     evidence = -0.5 * distance, np.exp(-0.5 * distance), truth
     made = Library(LIBRARY.materials, calibrate(LIBRARY.names, *evidence, "a trial"))
-    return Calibrated(made, cross_checked(LIBRARY.names, *evidence), 0.95, "labels.csv", "out/library.json")
+    probability, p_value = cross_checked(LIBRARY.names, *evidence)
+    table = table_of(LIBRARY.names, truth, probability, p_value > 0.05, 0.95)
+    return Calibrated(made, table, "labels.csv", "out/library.json")
 
 
 def test_pixels_are_counted(picture):
@@ -73,14 +77,15 @@ def test_pixels_are_counted(picture):
     report = Classified(picture, "map.nc", LIBRARY, "the bundled paints")
     assert classes_sentence(report).startswith("of 7 measured pixels white 43 %")
     assert classes_sentence(report).endswith("none of these 29 %; 1 more were not measured")
+    assert [row[2] for row in class_rows(report) if row[1] != "0"] == ["43 %", "14 %", "14 %", "29 %", "–"]
     nothing = Classified(mapped([[-2, -2]]), "map.nc", LIBRARY, "the bundled paints")
     assert classes_sentence(nothing) == "no pixel was measured"
 
 
 def test_colours_of_the_map_are_those_of_the_legend(picture):
     figure = class_figure(picture, "map")
-    assert legend(figure)[0] == "white: 3 (38 %)"
-    assert "none of these: 2 (25 %)" in legend(figure)
+    assert legend(figure)[0] == "white: 3 (43 %)"
+    assert "none of these: 2 (29 %)" in legend(figure)
     (image,) = figure.axes[0].get_images()
     shown = image.cmap(image.norm(np.asarray(image.get_array())))
     by_name = {
@@ -127,21 +132,37 @@ def test_the_folder_of_a_map(picture, tmp_path):
     assert "white 50 %, the others share the rest" in page
 
 
+@pytest.mark.slow
+def test_a_map_against_its_labels(picture, tmp_path):
+    truth = xr.DataArray(
+        [["white", "white", "white", ""], ["white", "cd-back", "cd-back", "white"]], dims=("y", "x")
+    )
+    table = judge_pixels(picture, truth)
+    report = Classified(picture, "map.nc", LIBRARY, "the bundled paints", labelled=table, labels="truth.npy")
+    files = write_classes(report, tmp_path / "out", figure_format="svg")
+    assert {"confusion.svg", "reliability.svg"} <= {f.name for f in files}
+    record = json.loads((tmp_path / "out" / "classes.json").read_text(encoding="utf-8"))
+    assert record["labelled"]["labels"] == "truth.npy"
+    assert np.sum(record["labelled"]["confusion"]) == 6
+    assert "of 6 labelled pixels" in files[0].read_text(encoding="utf-8")
+    assert "truth.npy: of 6 labelled pixels" in summary_text(report)
+
+
 def test_reliability(calibrated):
-    figure = reliability_figure(calibrated.judged, "trial")
-    found = calibrated.judged.reliability
+    found = calibrated.table.reliability
+    figure = reliability_figure(found, "trial")
     upper, lower = figure.axes
     assert f"error {found.error:.3f}" in upper.get_title()
     heights = [patch.get_height() for patch in lower.patches]
-    assert sum(heights) == len(calibrated.judged.truth)
+    assert sum(heights) == 150
     (points,) = [c.lines[0] for c in upper.containers if c.get_label() == "found"]
     assert np.array_equal(points.get_ydata(), found.accuracy[found.count > 0])
 
 
 def test_confusion(calibrated):
-    figure = confusion_figure(calibrated.judged, 0.95, "trial")
+    figure = confusion_figure(calibrated.table, "trial")
     ax = figure.axes[0]
-    matrix = calibrated.judged.confusion(0.95)
+    matrix = calibrated.table.counts
     written = {tuple(map(int, text.get_position()[::-1])): int(text.get_text()) for text in ax.texts}
     assert written == {place: int(n) for place, n in np.ndenumerate(matrix) if n}
     assert [t.get_text() for t in ax.get_xticklabels()] == [*LIBRARY.names, "none of these"]
@@ -167,7 +188,6 @@ def test_few_measurements_exclude_nothing(calibrated):
 
 
 def test_a_promise_that_is_not_kept_shows(calibrated):
-    assert level_of_calibration(calibrated) == "describes"
-    judged = calibrated.judged
-    broken = replace(judged, p_value=np.where(np.arange(150)[:, None] % 8 == 0, 0.01, judged.p_value))
-    assert level_of_calibration(replace(calibrated, judged=broken)) == "not"
+    assert level_of_sets(calibrated.table) == "describes"
+    broken = replace(calibrated.table, coverage=np.full(5, 0.8))
+    assert level_of_sets(broken) == "not"

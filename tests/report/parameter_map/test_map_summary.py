@@ -4,10 +4,18 @@ import io
 
 import numpy as np
 import pytest
+import xarray as xr
 from example_maps import example_map
 
 from pbrdf.report.parameter_map.shown_map import ShownMap, Window
-from pbrdf.report.parameter_map.summary import MapSummary, count_states, parameter_rows, print_map
+from pbrdf.report.parameter_map.summary import (
+    MapSummary,
+    count_states,
+    parameter_rows,
+    part_headings,
+    part_rows,
+    print_map,
+)
 from pbrdf.report.printing import printing_console
 
 
@@ -92,3 +100,27 @@ def test_what_is_printed_fits_a_narrow_terminal():
     print_map(summary_of(example_map((30, 30))), printing_console(file=text, width=110))
     assert "χ² per degree of freedom: median" in text.getvalue()
     assert max(map(len, text.getvalue().splitlines())) <= 110
+
+
+def test_medians_by_part():
+    """Two halves and a part without a result; labels of the whole map, though every other pixel is shown."""
+    found = example_map((60, 50))
+    numbers = np.repeat([[1, 0, 4]], 60, axis=0).repeat([25, 5, 20], axis=1)
+    found["status"].values[:, 30:] = 1
+    labels = xr.DataArray(
+        numbers, dims=("y", "x"), attrs={"flag_values": [1, 4], "flag_meanings": "left_half right"}
+    )
+    window = Window.of(found, most=30)
+    summary = MapSummary.of(found, ShownMap(found, window), labels)
+    left, right = summary.parts
+    assert (left.name, right.name, right.fitted) == ("left half", "right", 0)
+    shown = found["status"].values[::2, ::2] == 0
+    inside = shown & (numbers[::2, ::2] == 1)
+    assert left.fitted == inside.sum()
+    assert left.medians[0] == np.median(found["estimate"].values[0][::2, ::2][inside])
+    assert list(part_rows(summary))[1][1:3] == ["0", "–"]
+    assert part_headings(summary)[:3] == ["part", "pixels", "σ (sigma)"]
+    console = printing_console(file=io.StringIO(), width=120)
+    print_map(summary, console)
+    assert "medians by part of the sample" in console.file.getvalue()
+    assert MapSummary.of(found, ShownMap(found, window)).parts == ()

@@ -23,6 +23,7 @@ from pbrdf.data.schema import (
     ANGLES,
     COORDINATES,
     COVARIANCE,
+    DIMENSION,
     STOKES_AXES,
     VARIABLES,
     std_name,
@@ -32,7 +33,7 @@ from pbrdf.data.validation import validate
 from pbrdf.errors import DataError
 from pbrdf.files.plain_numbers import json_from_text
 
-__all__ = ["from_stored", "pixels_from_stored", "to_stored"]
+__all__ = ["from_stored", "pixels_from_stored", "require_no_pictures", "require_no_pixels", "to_stored"]
 
 _ANGLE_UNITS = {"degree": True, "degrees": True, "deg": True, "rad": False, "radian": False, "radians": False}
 _NANOMETRES = {
@@ -65,11 +66,45 @@ def from_stored(stored: xr.Dataset, path: Path) -> xr.Dataset:
     Raises
     ------
     DataError
-        If a unit is not understood or the content does not follow the schema.
+        If a unit is not understood, or the content does not follow the schema; of pictures and maps it says what takes
+        them.
     """
+    require_no_pixels(stored, path)
     ds = _understood(stored, path)
     validate(ds, origin=str(path))
     return ds
+
+
+def require_no_pixels(stored: xr.Dataset, path: Path) -> None:
+    """Raise if a file holds pictures, data of pixels or a map of parameters; the message says what takes them."""
+    if "estimate" in stored.variables and "parameter" in stored.dims:
+        raise DataError(
+            f"{path}: holds a map of fitted parameters, not measurements: pbrdf.open_map opens it, `pbrdf identify` "
+            "and pbrdf.identify_map tell the materials of its pixels"
+        )
+    require_no_pictures(stored, path)
+    pixels = [str(d) for d in stored.dims if d not in (DIMENSION, *STOKES_AXES)]
+    if DIMENSION in stored.dims and pixels and set(pixels) & _measured_dims(stored):
+        raise DataError(
+            f"{path}: holds data of pixels, with {', '.join(pixels)} beside {DIMENSION}: `pbrdf map` and pbrdf.fit_map "
+            "fit a model to each, `pbrdf identify` and pbrdf.identify_map tell their materials; in Python open it by "
+            "xarray.open_dataset"
+        )
+
+
+def require_no_pictures(stored: xr.Dataset, path: Path) -> None:
+    """Raise if a file holds Stokes pictures, whose pixels have no angles yet; the message says what gives them any."""
+    if "I" in stored.variables and {"y", "x"} <= set(stored.dims) and DIMENSION not in stored.dims:
+        raise DataError(
+            f"{path}: holds Stokes pictures, whose pixels have no geometry yet: `pbrdf map {path.name} -g flat:…` fits "
+            "a model to each, and `pbrdf identify` takes that map; pbrdf.map_dataset makes data of them, for "
+            "pbrdf.identify_map and pbrdf.fit_map; `pbrdf reduce --angles … --roi …` writes a data set of a region"
+        )
+
+
+def _measured_dims(stored: xr.Dataset) -> set[str]:
+    """Dimensions of what was measured."""
+    return {str(d) for name in VARIABLES if name in stored.variables for d in stored[name].dims}
 
 
 def pixels_from_stored(stored: xr.Dataset, path: Path) -> xr.Dataset:

@@ -25,6 +25,8 @@ __all__ = ["Panel"]
 
 #: Coordinates of ``pbrdf reduce`` (degrees) that say what is left open.
 _ANGLES = ("theta_i", "theta_r", "phi", "reference_angle")
+#: Angles that differ by no more are the same, radians.
+_SAME = 1e-4
 
 
 @dataclass(frozen=True)
@@ -32,7 +34,7 @@ class Panel(PixelGeometry):
     """A flat sample at given angles.
 
     Angles are single numbers or one for each series, radians; those left out are the coordinates of the Stokes
-    pictures, which ``pbrdf reduce --angles`` writes.
+    pictures, which ``pbrdf reduce --angles`` writes. Where pictures have them, others are refused.
 
     Attributes
     ----------
@@ -97,6 +99,8 @@ class Panel(PixelGeometry):
                 raise DataError(
                     f"the panel's {name} is not known: state it, or reduce the frames with a table of angles"
                 )
+        elif name in stokes.coords:
+            _require_same(name, np.atleast_1d(np.asarray(own, float)), np.deg2rad(stokes[name].values))
         values = np.atleast_1d(np.asarray(own, float))
         if not np.isfinite(values).all():
             raise DataError(f"a panel's {name} is not a finite number")
@@ -183,3 +187,20 @@ def _placed(
     tangent = math.sin(theta_r) * view - math.cos(theta_r) * p
     forward = math.cos(phi) * tangent + math.sin(phi) * s
     return normal, math.cos(theta_i) * normal - math.sin(theta_i) * forward
+
+
+def _require_same(name: str, stated: np.ndarray, carried: np.ndarray) -> None:
+    """Raise if an angle is stated that the pictures have, and otherwise."""
+    if stated.size in (1, carried.size):
+        off = (stated - carried + math.pi) % (2.0 * math.pi) - math.pi
+        # NaN is not known
+        if not (np.abs(off) > _SAME).any():
+            return
+    theirs, ours = (
+        " … ".join(f"{angle:g}°" for angle in np.unique(np.round(np.rad2deg([v.min(), v.max()]), 3)))
+        for v in (carried[np.isfinite(carried)], stated)
+    )
+    raise DataError(
+        f"the pictures say themselves that {name} is {theirs}, and {ours} is stated: leave {name} out, or reduce the "
+        "frames with another table of angles"
+    )

@@ -6,7 +6,7 @@
 
 from pbrdf.inversion.map_store.finished_map import open_map
 from pbrdf.inversion.map_store.map_source import DatasetSource, MapSource, file_identity
-from pbrdf.inversion.map_store.map_store import MapStore, PixelFit, prepare_store
+from pbrdf.inversion.map_store.map_store import MapStore, PixelFit, is_map, prepare_store
 from pbrdf.inversion.map_store.scheduler import run_on_scheduler
 from pbrdf.inversion.map_store.work import Work, run_units
 
@@ -17,6 +17,7 @@ __all__ = [
     "PixelFit",
     "Work",
     "file_identity",
+    "is_map",
     "open_map",
     "prepare_store",
     "run_on_scheduler",

@@ -38,6 +38,7 @@ __all__ = [
     "MapStore",
     "PixelFit",
     "damaged",
+    "is_map",
     "prepare_store",
     "stored_attributes",
 ]
@@ -305,6 +306,14 @@ def stored_attributes(path: Path) -> dict[str, Any]:
             f"{path}: this map has the layout {version}, of another version of pbrdf; {_LAYOUT} is known"
         )
     return attributes
+
+
+def is_map(path: Path) -> bool:
+    """Whether a folder is the store of a map, complete or not."""
+    try:
+        return _VERSION in json_from_text((path / "zarr.json").read_bytes())["attributes"]
+    except (OSError, ValueError, KeyError, TypeError):
+        return False
 
 
 def damaged(path: Path, error: Exception) -> DataError:

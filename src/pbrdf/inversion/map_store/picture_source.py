@@ -24,7 +24,8 @@ from pbrdf.data.formats.zarr_folder import open_zarr
 from pbrdf.data.schema import COORDINATES, DIMENSION, STOKES_AXES
 from pbrdf.errors import DataError
 from pbrdf.files.digest import sha256_of
-from pbrdf.files.netcdf_files import open_netcdf
+from pbrdf.files.netcdf_files import SIGNATURE, open_netcdf
+from pbrdf.files.text import first_bytes
 from pbrdf.instruments.pixel_geometry.geometry import PixelGeometry
 from pbrdf.instruments.pixel_geometry.labels import read_labels
 from pbrdf.instruments.pixel_geometry.map_dataset import map_block
@@ -227,6 +228,12 @@ def opened_pictures(path: Path) -> xr.Dataset:
     """
     if not path.exists():
         raise DataError(f"{path}: there is no such file")
+    if not path.is_dir() and first_bytes(path, len(SIGNATURE)) != SIGNATURE:
+        raise DataError(
+            f"{path}: is neither netCDF nor a Zarr folder, and a map is made of pictures: stokes.nc or .zarr of "
+            "`pbrdf reduce`, or data with dimensions beside geometry. Measurements in a table are fitted with "
+            f"`pbrdf fit {path.name}`, raw frames reduced first by `pbrdf reduce`"
+        )
     options: dict[str, Any] = {"decode_times": False, "cache": False}
     opened = open_zarr(path, **options) if path.is_dir() else open_netcdf(path, **options)
     if "I" in opened and {"y", "x"} <= set(opened.dims) and DIMENSION not in opened.dims:

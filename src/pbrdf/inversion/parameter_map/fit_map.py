@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pbrdf.data.schema import DIMENSION
+from pbrdf.data.schema import DIMENSION, VARIABLES, std_name
 from pbrdf.errors import DataError
 from pbrdf.inversion.noise import Noise
 from pbrdf.inversion.nuisance import Nuisance
@@ -67,7 +67,8 @@ def fit_map(
     dataset
         Data set of the project's schema with further dimensions, in any order, in its data variables and, where the
         geometry is that of each pixel, in ``theta_i``, ``theta_r`` and ``phi``. NaN is not measured and left out, and
-        so are directions below the horizon, infinite values and uncertainties that are not above 0. A variable
+        so are directions below the horizon, infinite values and uncertainties that are not above 0, unless that is so
+        for every value of a variable in memory: that is refused. A variable
         ``mask`` over the further dimensions, False or 0 where a pixel is to be left out, is kept to. Of Dask arrays
         the map is lazy, too: their chunks are the blocks, and ``geometry`` must be one chunk. Other arrays that lie
         in a file are read block by block.
@@ -134,6 +135,7 @@ def fit_map(
                 "be loaded for: give a data set that was opened without chunks, it is read block by block"
             )
         return _lazy(prepared, dataset, block)
+    _require_uncertainties(dataset, prepared.dims)
     clock = time.perf_counter()
     blocks = list(blocks_of(dataset, prepared.dims, block))
     prepared = prepared.solve_shared(_Blocks(dataset, blocks))
@@ -151,6 +153,22 @@ def fit_map(
         done += found["status"].size
     result.attrs |= summary(result) | {"seconds": time.perf_counter() - clock}
     return result
+
+
+def _require_uncertainties(dataset: xr.Dataset, dims: Sequence[str]) -> None:
+    """Raise if the uncertainties of a variable are nowhere above 0: nothing of it would count, and nothing said so."""
+    for name in map(str, dataset.data_vars):
+        std = dataset[name]
+        if name not in map(std_name, VARIABLES) or not isinstance(std.variable._data, np.ndarray):
+            continue
+        wrong = std.values <= 0.0
+        if wrong.any() and not (std.values > 0.0).any():
+            pixels = math.prod(dataset.sizes[d] for d in dims if d in std.dims)
+            along = tuple(std.dims.index(d) for d in std.dims if d not in dims)
+            raise DataError(
+                f"{name} is 0 or less at {int(wrong.any(axis=along).sum())} of {pixels} pixels, and nowhere above 0: "
+                "it is a standard uncertainty; leave it out where none is known"
+            )
 
 
 @dataclass(frozen=True)

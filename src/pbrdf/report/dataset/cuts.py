@@ -64,10 +64,11 @@ class Cut:
 
     def path_angles(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """θ_i, θ_r and φ in radians along the drawn curve; NaN as in ``path_x``."""
+        constant = np.where(np.isfinite(self.path_x), self.constant, np.nan)
         if self.kind == "theta_i":
-            theta_i, s = np.full_like(self.path_x, self.constant), self.path_x
+            theta_i, s = constant, self.path_x
         elif self.kind == "theta_r":
-            theta_i, s = self.path_x, np.full_like(self.path_x, self.constant)
+            theta_i, s = self.path_x, constant
         elif self.kind == "mirror":
             theta_i, s = self.path_x, self.path_x + self.constant
         else:

@@ -128,7 +128,7 @@ def fit_record(report: Report) -> dict[str, Any]:
             "name": report.name,
             **{
                 key: report.dataset.attrs[key]
-                for key in ("title", "source", "quantity")
+                for key in ("title", "source", "quantity", "scale", "simulated")
                 if key in report.dataset.attrs
             },
             "geometries": report.dataset.sizes["geometry"],

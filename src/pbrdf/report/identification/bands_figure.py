@@ -16,7 +16,6 @@ from pbrdf.identification.material import Material
 from pbrdf.identification.predictive import specimens_shown, typical_gains
 from pbrdf.inversion.observations import Observations
 from pbrdf.report.dataset.cuts import Cut
-from pbrdf.report.dataset.describe import short_name
 from pbrdf.report.dataset.panels import VIEWING_ANGLE, channel_label, scale_intensity, scale_signed
 from pbrdf.report.dataset.points import Points
 from pbrdf.report.dataset.quantities import channels_behind, is_intensity, quantity_of
@@ -26,6 +25,7 @@ from pbrdf.report.identification.subject import (
     nearest_rejected,
     p_value_in_words,
     probability_in_words,
+    shown_probability,
 )
 from pbrdf.report.style import BLUE, GREY, RED, looks_of, panels, styled
 
@@ -52,17 +52,18 @@ def shown_candidates(report: Identified) -> list[Candidate]:
 
 def bands_figure(report: Identified) -> Figure:
     """The measurement over the band of each shown candidate: a column a candidate, a row a quantity."""
+    assert report.dataset is not None  # of fitted parameters there is another figure
     points = Points.from_dataset(report.dataset)
     whole = shown_cuts(points)
     cuts = _few(whole.cuts)
     looks = looks_of(len(cuts))
     candidates = shown_candidates(report)
     names = list(points.channels)[:_MOST_QUANTITIES]
+    drawn = np.concatenate([cut.rows for cut in cuts]) if cuts else np.arange(points.theta_i.size)
     at = _along(report, cuts)
     with styled():
         handles = _handles(ShownCuts(cuts, looks, whole.found), report)
-        title = short_name(report.name, report.dataset)
-        figure, axes = panels(len(names), len(candidates), _PANEL, title, handles)
+        figure, axes = panels(len(names), len(candidates), _PANEL, report.title, handles)
         shared: dict[str, tuple[float, float]] = {}
         for column, candidate in enumerate(candidates):
             bands = _bands(report, candidate, at, names)
@@ -85,11 +86,12 @@ def bands_figure(report: Identified) -> Figure:
                     ax.set_xlabel("angle of incidence θi (°)" if over else VIEWING_ANGLE, fontsize=8.5)
                 else:
                     _side_by_side(ax, bands[name], channel.measured, channel.std)
-                _scale(ax, name, channel.measured, shared)
+                _scale(ax, name, channel.measured[drawn], shared)
                 ax.set_ylabel(channel_label(name, points) if column == 0 else "")
             state = "in the set" if candidate.accepted else "not in the set"
+            probability = probability_in_words(shown_probability(report.found, candidate))
             axes[0, column].set_title(
-                f"{candidate.name}: {state}\nprobability {probability_in_words(candidate.probability)}, "
+                f"{candidate.name}: {state}\nprobability {probability}, "
                 f"p-value {p_value_in_words(candidate.p_value)}",
                 fontsize=9.0,
                 color="black" if candidate.accepted else RED,
@@ -107,6 +109,7 @@ def _few(cuts: list[Cut]) -> list[Cut]:
 def _along(report: Identified, cuts: list[Cut]) -> Observations:
     """Geometries at which specimens are shown: along the cuts, or the measured ones."""
     data = report.found.data
+    assert data is not None
     theta_i, theta_r, phi = data.theta_i, data.theta_r, data.phi
     if cuts:
         theta_i, theta_r, phi = (
@@ -127,8 +130,8 @@ def _bands(
     likely = np.array([[candidate.values[name] for name in material.space.names]])
     parameters = np.concatenate([likely, drawn])
     shown = _quantities(material, parameters, at, names)
-    if report.found.gain:
-        gains = typical_gains(material, parameters, report.found.data)
+    if report.found.gain and (data := report.found.data) is not None:
+        gains = typical_gains(material, parameters, data)
         shown = {n: v * gains[:, None] if is_intensity(n) else v for n, v in shown.items()}
     ends = 0.5 * (1.0 - PART), 0.5 * (1.0 + PART)
     return {n: (*np.quantile(v[1:], ends, axis=0), v[0]) for n, v in shown.items()}
@@ -182,7 +185,9 @@ def _scale(ax: Axes, name: str, measured: np.ndarray, shared: dict[str, tuple[fl
             scale_intensity(ax, measured)
             positive = finite[finite > 0.0]
             if ax.get_yscale() == "log" and positive.size:
-                shared[name] = (0.4 * float(positive.min()), 2.5 * float(positive.max()))
+                # what lies below a limit that is set has been counted as not shown
+                lowest = 0.4 * float(positive.min()) if ax.get_autoscaley_on() else ax.get_ylim()[0]
+                shared[name] = (lowest, 2.5 * float(positive.max()))
             else:
                 shared[name] = (min(0.0, 1.1 * float(finite.min())), 1.35 * float(finite.max()))
         elif name == "dolp":
@@ -203,11 +208,12 @@ def _handles(shown: ShownCuts, report: Identified) -> list[Any]:
         Line2D([], [], color=look.colour, marker=look.marker, linestyle="none", label=shown.label(cut))
         for cut, look in zip(shown.cuts, shown.looks, strict=True)
     ]
-    if len(shown.cuts) < shown.found:
-        handles[-1].set_label(f"{handles[-1].get_label()} ({len(shown.cuts)} of {shown.found} curves drawn)")
     colour = GREY if shown.cuts else BLUE
     best = " (scaled to the data)" if report.found.gain else ""
-    handles.append(Line2D([], [], color="black", marker="o", linestyle="none", label="points: measured"))
+    some = f", {len(shown.cuts)} of {shown.found} curves" if len(shown.cuts) < shown.found else ""
+    handles.append(
+        Line2D([], [], color="black", marker="o", linestyle="none", label=f"points: measured{some}")
+    )
     handles.append(Patch(color=colour, alpha=0.3, linewidth=0, label=f"95 % of specimens{best}"))
     handles.append(Line2D([], [], color=colour, label="most likely specimen"))
     return handles

@@ -1,4 +1,4 @@
-"""Figures of a calibration: reliability of the probabilities, and which material was told as which."""
+"""Figures of labelled measurements: reliability of the probabilities, and which material was told as which."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pbrdf.identification.cross_check import Judged
+from pbrdf.identification.conformal import Reliability
+from pbrdf.identification.confusion import Confusion
 from pbrdf.report.style import BLUE, GREY, RED, new_figure, styled
 
 if TYPE_CHECKING:
@@ -15,12 +16,11 @@ if TYPE_CHECKING:
 __all__ = ["confusion_figure", "reliability_figure"]
 
 
-def reliability_figure(judged: Judged, title: str) -> Figure:
-    """How often the most probable material is the true one, by its probability; below, how many measurements.
+def reliability_figure(found: Reliability, title: str, what: str = "measurements") -> Figure:
+    """How often the most probable material is the true one, by its probability; below, how many there are of ``what``.
 
     Bars of the points are the standard errors of so many trials. On the diagonal probabilities are honest.
     """
-    found = judged.reliability
     with styled():
         figure = new_figure(5.6, 5.6)
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3.0, 1.0))
@@ -40,30 +40,29 @@ def reliability_figure(judged: Judged, title: str) -> Figure:
         upper.set_ylabel("part that is right")
         upper.legend(frameon=False, loc="upper left")
         upper.set_title(
-            f"expected calibration error {found.error:.3f}, accuracy {100.0 * judged.accuracy:.1f} %",
+            f"expected calibration error {found.error:.3f}, accuracy {100.0 * found.right:.1f} %",
             fontsize=10.0,
         )
         width = np.diff(found.edges)
         lower.bar(
             found.edges[:-1], found.count, width, align="edge", color=BLUE, alpha=0.75, edgecolor="white"
         )
-        lower.set_ylabel("measurements")
+        lower.set_ylabel(what)
         lower.set_xlabel("probability of the most probable material")
         lower.locator_params(axis="y", integer=True)
         figure.suptitle(title)
     return figure
 
 
-def confusion_figure(judged: Judged, confidence: float, title: str) -> Figure:
+def confusion_figure(table: Confusion, title: str) -> Figure:
     """Rows: what it was; columns: the most probable material of the set, or none of these."""
-    matrix = judged.confusion(confidence)
-    total = matrix.sum(axis=1, keepdims=True)
-    share = matrix / np.maximum(total, 1)
-    names = list(judged.names)
-    longest = max(map(len, names))
+    matrix = table.counts
+    share = matrix / matrix.sum(axis=1, keepdims=True)
+    rows, columns = list(table.truth), list(table.taken_for)
+    longest = max(map(len, [*rows, *columns]))
     with styled():
-        size = 0.62 * len(names)
-        figure = new_figure(size + 0.62 + 0.075 * longest + 1.9, size + 0.06 * longest + 1.4)
+        width, height = 0.62 * len(columns), 0.62 * len(rows)
+        figure = new_figure(width + 0.075 * longest + 1.9, height + 0.06 * longest + 1.4)
         ax = figure.add_subplot()
         ax.grid(visible=False)
         ax.imshow(share, cmap="Blues", vmin=0.0, vmax=1.0, aspect="equal")
@@ -73,34 +72,30 @@ def confusion_figure(judged: Judged, confidence: float, title: str) -> Figure:
                 ax.text(
                     column,
                     row,
-                    str(count),
+                    _short(count),
                     ha="center",
                     va="center",
                     fontsize=9.5,
                     color="white" if dark else "#202020",
                 )
         right: Any = ax.secondary_yaxis("right")
-        coverage = judged.coverage(confidence)
-        right.set_yticks(
-            range(len(names)),
-            [f"{100.0 * c:.0f} %" if np.isfinite(c) else "–" for c in coverage],
-            fontsize=9.0,
-        )
+        right.set_yticks(range(len(rows)), [f"{100.0 * part:.0f} %" for part in table.coverage], fontsize=9.0)
         right.tick_params(length=0)
-        right.set_ylabel(f"sets that hold it ({100.0 * confidence:g} % promised)", fontsize=9.0)
+        right.set_ylabel(f"sets that are right ({100.0 * table.confidence:g} % promised)", fontsize=9.0)
         for spine in (*ax.spines.values(), *right.spines.values()):
             spine.set_visible(False)
-        ax.axvline(len(names) - 0.5, color=GREY, linewidth=1.0)
-        ax.set_xticks(
-            range(len(names) + 1),
-            [*names, "none of these"],
-            rotation=35.0,
-            ha="right",
-            rotation_mode="anchor",
-        )
-        ax.set_yticks(range(len(names)), names)
+        ax.axvline(len(columns) - 1.5, color=GREY, linewidth=1.0)
+        if (known := int((~table.strangers).sum())) < len(rows):
+            ax.axhline(known - 0.5, color=GREY, linewidth=1.0)
+        ax.set_xticks(range(len(columns)), columns, rotation=35.0, ha="right", rotation_mode="anchor")
+        ax.set_yticks(range(len(rows)), rows)
         ax.tick_params(length=0)
         ax.set_ylabel("material")
         ax.set_xlabel("told as")
         ax.set_title(title)
     return figure
+
+
+def _short(count: int) -> str:
+    """A count that fits in a cell."""
+    return str(count) if count < 10_000 else f"{count / 1000:.0f}k"

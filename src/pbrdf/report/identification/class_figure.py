@@ -36,7 +36,7 @@ class ClassCount:
     name
         Of the material, ``none of these`` or ``not measured``.
     pixels, share
-        How many, and what part of all pixels of the map.
+        How many, and what part of the measured pixels; NaN for those that were not measured.
     confidence
         Median of the probability of the material at these pixels; NaN for no material.
     """
@@ -59,11 +59,13 @@ def class_counts(found: xr.Dataset) -> list[ClassCount]:
     material, confidence = found["material"].values, found["confidence"].values
     names = {number: str(name) for number, name in enumerate(found["material_name"].values)}
     names |= {NONE_OF_THESE: "none of these", NOT_MEASURED: "not measured"}
-    counts = []
+    counts, measured = [], max(int((material != NOT_MEASURED).sum()), 1)
     for value, name in names.items():
         where = material == value
+        pixels = int(where.sum())
+        share = pixels / measured if value != NOT_MEASURED else math.nan
         median = float(np.median(confidence[where])) if value >= 0 and where.any() else math.nan
-        counts.append(ClassCount(value, name, int(where.sum()), float(where.mean()), median))
+        counts.append(ClassCount(value, name, pixels, share, median))
     return counts
 
 
@@ -110,16 +112,25 @@ def class_figure(found: xr.Dataset, title: str) -> Figure:
                 facecolor=palette(norm(count.value)),
                 edgecolor="#555555",
                 linewidth=0.5,
-                label=f"{count.name}: {count.pixels} ({per_cent(count.share)})",
+                label=_counted(count),
             )
             for count in counts
             if count.pixels or count.value >= 0
         ]
         figure.legend(
-            handles=handles, loc="outside right upper", frameon=False, title="pixels", alignment="left"
+            handles=handles,
+            loc="outside right upper",
+            frameon=False,
+            title="pixels (share of measured)",
+            alignment="left",
         )
         figure.suptitle(title)
     return figure
+
+
+def _counted(count: ClassCount) -> str:
+    share = f" ({per_cent(count.share)})" if math.isfinite(count.share) else ""
+    return f"{count.name}: {count.pixels}{share}"
 
 
 def _shown(found: xr.Dataset) -> tuple[np.ndarray, np.ndarray, tuple[str, str]]:

@@ -8,10 +8,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pbrdf.files.atomic import atomic_folder
-from pbrdf.report.identification.calibrated import Calibrated, calibrated_sentence, calibration_rests_on
+from pbrdf.report.identification.calibrated import Calibrated, calibration_rests_on
 from pbrdf.report.identification.classified import Classified, classes_rest_on, classes_sentence
-from pbrdf.report.identification.page import calibration_page, classes_page, page_text
-from pbrdf.report.identification.subject import Identified, rests_on, sentence
+from pbrdf.report.identification.confusion_table import confusion_record, confusion_sentence
+from pbrdf.report.identification.labelled import LabelledReport, labels_rest_on
+from pbrdf.report.identification.page import calibration_page, classes_page, labelled_page, page_text
+from pbrdf.report.identification.subject import (
+    Identified,
+    ranked,
+    rests_on,
+    sentence,
+    shown_probability,
+)
 from pbrdf.report.identification.summary import summary_text
 from pbrdf.report.numbers import plain
 from pbrdf.version import __version__
@@ -20,7 +28,9 @@ if TYPE_CHECKING:
     from markupsafe import Markup
     from matplotlib.figure import Figure
 
-__all__ = ["LIBRARY", "MAP", "write_calibration", "write_classes", "write_identification"]
+    from pbrdf.identification.confusion import Confusion
+
+__all__ = ["LIBRARY", "MAP", "write_calibration", "write_classes", "write_identification", "write_labelled"]
 
 #: Names of the map of materials and of a calibrated library in a folder.
 MAP, LIBRARY = "materials.nc", "library.json"
@@ -34,10 +44,20 @@ _CAPTIONS = {
         "Lines: the specimen that this measurement makes most likely. The last column is the nearest material outside "
         "the set, if there is one.",
     ),
+    "parameters": (
+        "The fitted parameters over what specimens of each material have.",
+        "Bars: the middle 95 % of the specimens of a material, red where it is not in the set. Line and band: the fit "
+        "and its standard error; without a band the fit does not determine the parameter.",
+    ),
+    "next": (
+        "What one reading more is expected to tell, by its geometry.",
+        "In the plane of incidence; view angles on the side of the source are negative. Star: the best geometry. "
+        "Crosses: measured so far.",
+    ),
     "classes": (
         "The material of each pixel and its probability.",
         "The probability is that of the material told, given that it is one of the library. Black: like none of the "
-        "materials. Grey: not measured. Counts are those of all pixels.",
+        "materials. Grey: not measured. Shares are of the measured pixels.",
     ),
     "reliability": (
         "How often the most probable material is the true one, by its probability.",
@@ -45,7 +65,8 @@ _CAPTIONS = {
     ),
     "confusion": (
         "Which material was told as which.",
-        "Told: the most probable material of the set. On the right, how many sets hold the true material.",
+        "Told: the most probable material of the set. On the right, how many sets hold the true material, or are empty "
+        "where the library has not got it.",
     ),
 }
 
@@ -75,9 +96,11 @@ def write_identification(
         If the folder cannot be written.
     """
     from pbrdf.report.identification.bands_figure import bands_figure
+    from pbrdf.report.identification.next_reading import next_figure, next_record
+    from pbrdf.report.identification.parameters_figure import parameters_figure
 
     found = report.found
-    record = {
+    record: dict[str, Any] = {
         "data": report.name,
         "verdict": sentence(found),
         "set": found.materials,
@@ -93,17 +116,24 @@ def write_identification(
             {
                 "material": candidate.name,
                 "in_set": candidate.accepted,
-                "probability": candidate.probability,
+                "probability": shown_probability(found, candidate),
                 "p_value": candidate.p_value,
                 "distance": candidate.distance,
                 "scatter": found.library[candidate.name].scatter,
                 "most_likely_specimen": candidate.values,
             }
-            for candidate in found.candidates
+            for candidate in ranked(found)
         ],
         "rests_on": rests_on(report),
     }
-    draw = {"bands": lambda: bands_figure(report)}
+    draw: dict[str, Callable[[], Figure]] = {}
+    if (fitted := report.fitted) is not None:
+        draw["parameters"] = lambda: parameters_figure(found, fitted, Path(report.name).name)
+    else:
+        draw["bands"] = lambda: bands_figure(report)
+    if (following := report.next_measurement) is not None and (data := found.data) is not None:
+        record["next_measurement"] = next_record(following, len(found.materials))
+        draw["next"] = lambda: next_figure(following, data, "one reading more, in the plane of incidence")
     return _write(report, directory, "identification.json", record, draw, page_text, figure_format)
 
 
@@ -112,7 +142,7 @@ def write_classes(report: Classified, directory: Path, *, figure_format: str | N
     from pbrdf.files.netcdf_files import write_netcdf_file
     from pbrdf.report.identification.class_figure import class_figure
 
-    record = {
+    record: dict[str, Any] = {
         "map": report.name,
         "verdict": classes_sentence(report),
         "confidence": report.confidence,
@@ -122,7 +152,7 @@ def write_classes(report: Classified, directory: Path, *, figure_format: str | N
                 "value": count.value,
                 "class": count.name,
                 "pixels": count.pixels,
-                "share": count.share,
+                "share_of_measured": count.share,
                 "median_probability": count.confidence,
             }
             for count in report.counts
@@ -140,6 +170,11 @@ def write_classes(report: Classified, directory: Path, *, figure_format: str | N
         return [MAP]
 
     draw = {"classes": lambda: class_figure(report.found, title)}
+    if (labelled := report.labelled) is not None:
+        record["labelled"] = {"labels": report.labels, **confusion_record(labelled)}
+        draw |= _drawn_tables(
+            labelled, f"{Path(report.labels).name}: {labelled.total} labelled pixels", "pixels"
+        )
     return _write(report, directory, "classes.json", record, draw, classes_page, figure_format, save)
 
 
@@ -147,27 +182,12 @@ def write_calibration(
     report: Calibrated, directory: Path, *, figure_format: str | None = "png", with_library: bool = False
 ) -> list[Path]:
     """Write page, summary, numbers and figures, `with_library` the library too; as :func:`write_identification`."""
-    from pbrdf.report.identification.calibration_figure import confusion_figure, reliability_figure
-
-    judged, at = report.judged, report.confidence
-    found = judged.reliability
-    record = {
+    record: dict[str, Any] = {
         "labels": report.name,
-        "verdict": calibrated_sentence(report),
-        "confidence": at,
+        "verdict": confusion_sentence(report.table, "measurements"),
+        "confidence": report.table.confidence,
         "library": report.written,
-        "materials": list(judged.names),
-        "coverage": judged.coverage(at),
-        "confusion": judged.confusion(at),
-        "confusion_columns": [*judged.names, "none of these"],
-        "accuracy": judged.accuracy,
-        "expected_calibration_error": found.error,
-        "reliability": {
-            "edges": found.edges,
-            "confidence": found.confidence,
-            "accuracy": found.accuracy,
-            "count": found.count,
-        },
+        **confusion_record(report.table),
         "rests_on": calibration_rests_on(report),
     }
 
@@ -177,12 +197,36 @@ def write_calibration(
         report.library.write(folder / LIBRARY)
         return [LIBRARY]
 
-    title = f"{Path(report.name).name}: {len(judged.truth)} labelled measurements"
-    draw = {
-        "confusion": lambda: confusion_figure(judged, at, title),
-        "reliability": lambda: reliability_figure(judged, title),
-    }
+    title = f"{Path(report.name).name}: {report.table.total} labelled measurements"
+    draw = _drawn_tables(report.table, title, "measurements")
     return _write(report, directory, "calibration.json", record, draw, calibration_page, figure_format, save)
+
+
+def write_labelled(
+    report: LabelledReport, directory: Path, *, figure_format: str | None = "png"
+) -> list[Path]:
+    """Write page, summary, numbers and figures of labelled measurements; as :func:`write_identification`."""
+    record: dict[str, Any] = {
+        "labels": report.name,
+        "verdict": confusion_sentence(report.table, "measurements"),
+        "confidence": report.table.confidence,
+        "library": report.library,
+        **confusion_record(report.table),
+        "rests_on": labels_rest_on(report),
+    }
+    title = f"{Path(report.name).name}: {report.table.total} labelled measurements"
+    draw = _drawn_tables(report.table, title, "measurements")
+    return _write(report, directory, "labelled.json", record, draw, labelled_page, figure_format)
+
+
+def _drawn_tables(table: Confusion, title: str, what: str) -> dict[str, Callable[[], Figure]]:
+    """Confusion, and reliability where there is any."""
+    from pbrdf.report.identification.calibration_figure import confusion_figure, reliability_figure
+
+    draw = {"confusion": lambda: confusion_figure(table, title)}
+    if (found := table.reliability) is not None:
+        draw["reliability"] = lambda: reliability_figure(found, title, what)
+    return draw
 
 
 def _write(

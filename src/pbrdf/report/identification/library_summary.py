@@ -19,6 +19,12 @@ if TYPE_CHECKING:
 
 __all__ = ["calibration_in_words", "print_library", "print_material", "scatter_in_words"]
 
+#: What to do about fits that are not sound.
+REMEDY = (
+    "What to do: find a model that describes the specimens (`pbrdf compare DATA`, then `pbrdf library add NAME DATA "
+    "--model MODEL`); hold a parameter that the data do not tell (`pbrdf fit --fix`), or measure more geometries."
+)
+
 
 def print_library(library: Library, name: str, console: Console) -> None:
     """Print a line for each material, and whether the library is calibrated."""
@@ -71,6 +77,12 @@ def _listed(library: Library, name: str) -> Iterator[RenderableType]:
     yield table
     if any(material.scatter == "assumed" for material in library.materials):
         yield "Assumed: too few specimens were measured to show how they differ; sets are only as good as that guess."
+    doubted = [material.name for material in library.materials if material.fits.cautions]
+    if doubted:
+        yield (
+            f"Caution: the fits behind {', '.join(doubted)} are not sound in every respect; `pbrdf library show` says "
+            "why."
+        )
     yield calibration_in_words(library)
 
 
@@ -99,8 +111,31 @@ def _material(material: Material) -> Iterator[RenderableType]:
     if material.scatter == "assumed":
         words += " No one measured how specimens differ: the numbers above are a guess."
     yield words
+    yield from _fits(material)
     for sentence in material.provenance:
         yield f"From: {sentence}"
+
+
+def _fits(material: Material) -> Iterator[str]:
+    """What the specimens' fits are worth, and what to do where it is not much."""
+    fits = material.fits
+    sizes = []
+    if math.isfinite(fits.reduced_chi2):
+        sizes.append(f"χ² by degree of freedom {brief(fits.reduced_chi2, 2)}")
+    if math.isfinite(fits.missed):
+        sizes.append(f"they miss by {per_cent(fits.missed)} of the signal")
+    if sizes:
+        yield f"Fits of the specimens (median): {', '.join(sizes)}."
+    if fits.misfits():
+        yield (
+            "Caution: the model misses its own specimens by more than their uncertainties. Identification takes that "
+            "for a difference between materials: find a model that describes them (`pbrdf compare DATA`), or state "
+            "noise that covers it (`pbrdf identify --noise`)."
+        )
+    for caution in fits.cautions:
+        yield f"Caution: {caution}"
+    if fits.cautions:
+        yield REMEDY
 
 
 def _wavelength(material: Material) -> str:

@@ -54,7 +54,7 @@ def write_map_report(
         If the folder cannot be written.
     """
     shown = ShownMap(report.dataset)
-    summary = MapSummary.of(report.dataset, shown)
+    summary = MapSummary.of(report.dataset, shown, report.labels)
     with atomic_folder(directory, fill=True) as temporary:
         pieces: dict[str, Markup] = {}
         names = ["summary.txt"]

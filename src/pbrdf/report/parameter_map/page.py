@@ -19,7 +19,7 @@ from pbrdf.report.page import (
     versions,
 )
 from pbrdf.report.parameter_map.subject import MapReport
-from pbrdf.report.parameter_map.summary import MapSummary, counted, parameter_rows
+from pbrdf.report.parameter_map.summary import MapSummary, counted, parameter_rows, part_headings, part_rows
 from pbrdf.version import __version__
 
 if TYPE_CHECKING:
@@ -93,6 +93,15 @@ def _found(summary: MapSummary) -> Iterator[Markup]:
         numeric=(2, 3, 4, 6, 7),
         classes=["fixed" if p.same else "" for p in summary.parameters],
     )
+    if summary.parts:
+        headings = part_headings(summary)
+        yield table(
+            "Parts of the sample that the labels tell apart: pixels with a result, and medians of the parameters over "
+            "those that determine them.",
+            headings,
+            list(part_rows(summary)),
+            numeric=range(1, len(headings)),
+        )
     if summary.sampled():
         yield paragraph(summary.sampled())
 

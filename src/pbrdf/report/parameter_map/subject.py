@@ -31,6 +31,9 @@ class MapReport:
         The line that repeats it; empty if there is none.
     simulated
         Whether the data are no measurement.
+    labels
+        Parts of the sample, as of :func:`pbrdf.instruments.pixel_geometry.labels.read_labels`; None where pixels have
+        none.
     """
 
     dataset: xr.Dataset
@@ -39,3 +42,4 @@ class MapReport:
     settings: Mapping[str, Any] = field(default_factory=dict)
     command: str = ""
     simulated: bool = False
+    labels: xr.DataArray | None = None

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pbrdf.instruments.pixel_geometry.labels import label_names
 from pbrdf.report.numbers import brief, per_cent, with_error
 from pbrdf.report.parameter_map.shown_map import GOOD, PENDING, WITHOUT, Label, ShownMap
 from pbrdf.report.printing import plain_table, print_parts
@@ -19,8 +20,20 @@ if TYPE_CHECKING:
     import xarray as xr
     from rich.console import Console, RenderableType
 
-__all__ = ["MapSummary", "ParameterSummary", "count_states", "counted", "parameter_rows", "print_map"]
+__all__ = [
+    "MapSummary",
+    "ParameterSummary",
+    "PartSummary",
+    "count_states",
+    "counted",
+    "parameter_rows",
+    "part_headings",
+    "part_rows",
+    "print_map",
+]
 
+#: Parts of the sample that are listed, at most.
+_MOST_PARTS = 30
 #: Pixels of a map whose states are counted at a time.
 _AT_A_TIME = 4_000_000
 #: Share of the measured pixels without a result, and χ² per degree of freedom, from which on a map is not called good,
@@ -56,6 +69,25 @@ class ParameterSummary:
     same: bool
 
 
+@dataclass(frozen=True)
+class PartSummary:
+    """One part of the sample, of those that labels tell apart.
+
+    Attributes
+    ----------
+    name
+        Of the part.
+    fitted
+        Shown pixels of it with a result.
+    medians
+        Of each parameter over its pixels that determine it, in shown units; NaN where none does.
+    """
+
+    name: str
+    fitted: int
+    medians: tuple[float, ...]
+
+
 @dataclass(frozen=True, eq=False)
 class MapSummary:
     """What a map says.
@@ -75,6 +107,8 @@ class MapSummary:
         Numbers of pixels.
     model, noise
         In words.
+    parts
+        Of the sample, in the order of their labels; empty without labels.
     """
 
     states: Mapping[str, int]
@@ -86,10 +120,11 @@ class MapSummary:
     total: int
     model: str
     noise: str
+    parts: tuple[PartSummary, ...] = ()
 
     @classmethod
-    def of(cls, dataset: xr.Dataset, shown: ShownMap) -> MapSummary:
-        """Of a map, whose states are counted here, and its shown pixels."""
+    def of(cls, dataset: xr.Dataset, shown: ShownMap, labels: xr.DataArray | None = None) -> MapSummary:
+        """Of a map, whose states are counted here, its shown pixels, and the parts that these belong to."""
         good = shown.good
         count = max(int(good.sum()), 1)
         reduced = shown.reduced_chi2[good & np.isfinite(shown.reduced_chi2)]
@@ -105,6 +140,7 @@ class MapSummary:
             total=dataset["status"].size,
             model=_model_in_words(dataset.attrs),
             noise=str(dataset.attrs.get("noise", "")),
+            parts=() if labels is None else tuple(_parts_of(shown, labels)),
         )
 
     @property
@@ -219,6 +255,22 @@ def _of_parameter(shown: ShownMap, k: int) -> ParameterSummary:
     )
 
 
+def _parts_of(shown: ShownMap, labels: xr.DataArray) -> Iterator[PartSummary]:
+    """Medians by label, over the shown pixels."""
+    window = shown.window
+    steps = {d: slice(None, None, n) for d, n in zip(window.dims, window.steps, strict=True)}
+    there = {d: at for d, at in {**steps, **window.others}.items() if d in labels.dims}
+    part = labels.isel(there)
+    # a label holds along dimensions that the picture of labels has not
+    more = {d: n for d, n in zip(window.dims, window.shape, strict=True) if d not in part.dims}
+    numbers = part.expand_dims(more).transpose(*window.dims).values
+    for number, name in label_names(labels).items():
+        inside = numbers == number
+        values = (shown.estimate[k][shown.determined(k) & inside] for k in range(len(shown.labels)))
+        medians = tuple(float(np.median(v)) if v.size else math.nan for v in values)
+        yield PartSummary(name.replace("_", " "), int((shown.good & inside).sum()), medians)
+
+
 def _model_in_words(attrs: Mapping[str, Any]) -> str:
     try:
         described = json.loads(str(attrs.get("model", "")))
@@ -251,6 +303,25 @@ def parameter_rows(summary: MapSummary) -> Iterator[list[str]]:
         ]
 
 
+def part_headings(summary: MapSummary) -> list[str]:
+    """Columns of the table of parts: those parameters that are not the same everywhere."""
+    return ["part", "pixels", *(p.label.with_unit for p in summary.parameters if not p.same)]
+
+
+def part_rows(summary: MapSummary) -> Iterator[list[str]]:
+    """Cells of a table of the parts below :func:`part_headings`: name, pixels with a result, medians."""
+    varied = [k for k, p in enumerate(summary.parameters) if not p.same]
+    for part in summary.parts[:_MOST_PARTS]:
+        medians = (part.medians[k] for k in varied)
+        yield [
+            part.name,
+            counted(part.fitted),
+            *(brief(m) if math.isfinite(m) else "–" for m in medians),
+        ]
+    if len(summary.parts) > _MOST_PARTS:
+        yield [f"{len(summary.parts) - _MOST_PARTS} more", *[""] * (1 + len(varied))]
+
+
 def print_map(summary: MapSummary, console: Console) -> None:
     """Print what a map says."""
     print_parts(_parts(summary), console)
@@ -271,5 +342,10 @@ def _parts(summary: MapSummary) -> Iterator[RenderableType]:
     for row in parameter_rows(summary):
         table.add_row(*row)
     yield table
+    if summary.parts:
+        parts = plain_table("medians by part of the sample", *part_headings(summary))
+        for row in part_rows(summary):
+            parts.add_row(*row)
+        yield parts
     if summary.sampled():
         yield summary.sampled()

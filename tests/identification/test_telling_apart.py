@@ -7,15 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.integrate import quad
-from scipy.stats import norm
+from scipy.optimize import nnls
+from scipy.stats import chi2, norm
 
 import pbrdf
 from pbrdf.errors import FitError
-from pbrdf.identification.conformal import probabilities
+from pbrdf.identification.conformal import Calibration, nominal, probabilities
 from pbrdf.identification.evidence import evidence, linearised, posterior
 from pbrdf.identification.identify import identify
 from pbrdf.identification.library import Library, bundled_library
-from pbrdf.identification.next_measurement import expected_information, next_measurement
+from pbrdf.identification.telling_apart import expected_information, next_measurement, non_negative
 from pbrdf.planning.candidates import in_plane_candidates
 
 LIBRARY = bundled_library()
@@ -42,10 +43,14 @@ def test_two_normal_distributions_of_one_number():
         each = densities(y)
         return (each * np.log2(each / p / each.sum())).sum()
 
-    information, right = expected_information(p, m[None, :, None], (s**2)[None, :, None, None])
+    limit = np.array([2.0, 1.0])
+    information, right, left = expected_information(p, m[None, :, None], (s**2)[None, :, None, None], limit)
     limits = {"epsabs": 1e-9, "limit": 200}
-    assert information[0] == pytest.approx(quad(told, -10, 10, **limits)[0], abs=3e-3)
-    assert right[0] == pytest.approx(quad(lambda y: densities(y).max(), -10, 10, **limits)[0], abs=3e-3)
+    assert information[0] == pytest.approx(quad(told, -10, 10, **limits)[0], abs=5e-3)
+    assert right[0] == pytest.approx(quad(lambda y: densities(y).max(), -10, 10, **limits)[0], abs=5e-3)
+    root = np.sqrt(limit) * s
+    ends = norm.cdf(np.stack([m - root, m + root])[..., None], m, s)  # ends of k, readings of c
+    assert left[0] == pytest.approx(float(((ends[1] - ends[0]) @ p).sum()), abs=6e-3)
 
 
 def test_limits_of_the_information():
@@ -53,13 +58,19 @@ def test_limits_of_the_information():
     entropy = -(p * np.log2(p)).sum()
     mean = np.array([[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]] * 3)
     covariance = np.eye(2) * np.array([1e-8, 1.0, 1e8])[:, None, None, None] * np.ones((3, 3, 1, 1))
-    information, right = expected_information(p, mean, covariance)
+    limit = np.full(3, 6.0)
+    inside = chi2.cdf(6.0, 2)
+    information, right, left = expected_information(p, mean, covariance, limit)
+    assert left[0] == pytest.approx(inside, abs=0.01)  # its own set alone
+    assert left[2] == pytest.approx(3.0 * inside, abs=0.02)
     assert information[0] == pytest.approx(entropy)  # separates perfectly
     assert right[0] == pytest.approx(1.0)
     assert 0.0 < information[1] < entropy
     assert information[2] == pytest.approx(0.0, abs=1e-4)  # drowned in noise
     assert right[2] == pytest.approx(p.max(), abs=1e-4)
-    same, right = expected_information(p, np.zeros((1, 3, 2)), covariance[:1])
+    same, right, left = expected_information(p, np.zeros((1, 3, 2)), covariance[:1], limit)
+    assert left[0] == pytest.approx(3.0 * inside, abs=0.02)
+    assert expected_information(p, mean, covariance, np.full(3, -1.0))[2].tolist() == [0.0] * 3
     assert same[0] == pytest.approx(0.0, abs=1e-12)
     assert right[0] == pytest.approx(p.max())
 
@@ -70,10 +81,11 @@ def test_information_does_not_depend_on_units_or_order():
     root = rng.normal(size=(4, 3, 2, 2))
     covariance = root @ root.swapaxes(-1, -2) + 0.1 * np.eye(2)
     turn = np.array([[3.0, 0.0], [-0.7, 0.2]])  # lower triangular: the same points of the sequence
-    found = expected_information(p, mean, covariance)[0]
-    other = expected_information(p, mean @ turn.T, turn @ covariance @ turn.T)[0]
+    limit = np.array([3.0, 5.0, 4.0])
+    found = np.array(expected_information(p, mean, covariance, limit))
+    other = np.array(expected_information(p, mean @ turn.T, turn @ covariance @ turn.T, limit))
     np.testing.assert_allclose(other, found, rtol=1e-9)
-    shuffled = expected_information(p[::-1], mean[:, ::-1], covariance[:, ::-1])[0]
+    shuffled = np.array(expected_information(p[::-1], mean[:, ::-1], covariance[:, ::-1], limit[::-1]))
     np.testing.assert_allclose(shuffled, found, rtol=1e-9)
 
 
@@ -161,6 +173,24 @@ def test_relative_and_absolute_part_of_assumed_noise():
     np.testing.assert_allclose(ranked.noise[0], [0.02, 0.1 * np.median(intensity)], rtol=1e-6)
 
 
+def test_parts_of_the_noise_are_those_of_scipys_least_squares():
+    rng = np.random.default_rng(3)
+    size = rng.lognormal(size=9)
+    for std in (0.03 * size, np.full(9, 0.2), np.hypot(0.02 * size, 0.1), rng.lognormal(size=9), 0.1 / size):
+        columns = np.stack([size**2, np.ones(9)], axis=1) / std[:, None] ** 2
+        np.testing.assert_allclose(non_negative(columns), nnls(columns, np.ones(9))[0], atol=1e-12)
+    assert non_negative(np.ones((4, 2))).tolist() == [1.0, 0.0]  # one is enough
+
+
+def test_a_calibration_says_what_leaves_the_set():
+    """Materials with few calibration measurements never leave; the limits are those of the calibrated p-values."""
+    found = identify(measurement(), PAIR)
+    many = Calibration(tuple(PAIR.names), (np.linspace(0.1, 1.0, 99), np.linspace(0.1, 1.0, 5)))
+    calibrated = next_measurement(identify(measurement(), PAIR, calibration=many), (0.5, 1.2, 0.0))
+    assert calibrated.expected_left[0] < next_measurement(found, (0.5, 1.2, 0.0)).expected_left[0] + 1.0
+    assert calibrated.expected_left[0] >= 1.0  # the second one always
+
+
 def test_what_cannot_be():
     found = identify(measurement(), PAIR)
     with pytest.raises(FitError, match="noise=0"):
@@ -197,6 +227,7 @@ def test_against_simulated_specimens_and_readings():
     rng = np.random.default_rng(1)
     data, count, noise = found.data, 1000, 0.03
     chosen = {
+        (39.5, 45.5): 0.1,
         (50.0, 80.0): 0.05, (36.4, 38.6): 0.05, (50.0, 50.0): 0.05, (20.0, 45.0): 0.05, (55.0, 5.0): 0.01,
     }  # fmt: skip
     told, expected = [], []
@@ -221,12 +252,17 @@ def test_against_simulated_specimens_and_readings():
                     )
                 )
                 truth.append(c)
-        after = probabilities(evidence(materials, batch).log_evidence)
+        judged = evidence(materials, batch)
+        after = probabilities(judged.log_evidence)
         truth = np.array(truth)
         rows, weight = np.arange(len(truth)), p[truth] / count
         told.append(float((weight * np.log2(after[rows, truth] / p[truth])).sum()))
         right = float((weight * (after.argmax(axis=1) == truth)).sum())
+        inside = nominal(judged.distance, judged.degrees_of_freedom) > 0.05
         here = next_measurement(found, angles, noise=noise)
+        assert here.expected_left[0] == pytest.approx(
+            float((weight * inside.sum(axis=1)).sum()), abs=2.0 * within
+        )
         expected.append(here.information[0])
         assert here.information[0] == pytest.approx(told[-1], abs=within)
         assert here.expected_right[0] == pytest.approx(right, abs=within)
