@@ -28,6 +28,7 @@ from pbrdf.data.schema import (
     VARIABLES,
     std_name,
     variable_units,
+    with_group,
 )
 from pbrdf.data.validation import validate
 from pbrdf.errors import DataError
@@ -70,7 +71,7 @@ def from_stored(stored: xr.Dataset, path: Path) -> xr.Dataset:
         them.
     """
     require_no_pixels(stored, path)
-    ds = _understood(stored, path)
+    ds = with_group(_understood(stored, path))
     validate(ds, origin=str(path))
     return ds
 
@@ -186,7 +187,7 @@ def to_stored(ds: xr.Dataset) -> xr.Dataset:
         If `ds` does not follow the schema.
     """
     validate(ds)
-    stored = ds.copy()
+    stored = with_group(ds).copy()
     for name in ANGLES:
         if name in ds.variables:
             degrees = exact_degrees(ds[name].values)

@@ -14,6 +14,7 @@ from pbrdf.inversion.comparison import NEAR_SPECULAR, near_specular_tilt
 from pbrdf.inversion.estimates import Estimate
 from pbrdf.inversion.result import FitResult
 from pbrdf.inversion.verdict import Verdict
+from pbrdf.models.parameters import shown_unit
 from pbrdf.report.dataset.describe import (
     cautions,
     columns_in_words,
@@ -21,7 +22,7 @@ from pbrdf.report.dataset.describe import (
     wavelengths_in_words,
 )
 from pbrdf.report.fit.subject import Report
-from pbrdf.report.numbers import brief, per_cent, shown_unit, with_error
+from pbrdf.report.numbers import brief, per_cent, with_error
 from pbrdf.report.printing import bare_table, print_parts, printing_console
 
 if TYPE_CHECKING:
