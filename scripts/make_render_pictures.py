@@ -1,4 +1,4 @@
-"""Make the rendered pictures of the documentation: ``docs/images/{car,spheres,pbsdf-vs-plugin,inverse-rendering}.png``.
+"""Make the rendered pictures of the documentation: ``docs/images/{fender,spheres,pbsdf-vs-plugin,inverse-rendering}.png``.
 
 Run it with: python scripts/make_render_pictures.py [NAME …]   (needs mitsuba; minutes)
 """
@@ -42,9 +42,9 @@ def scene(
     return make_scene(subject(name, bsdfs, size[0] / size[1]), "sky", size, sky=sky)
 
 
-def car(target: Path) -> None:
-    """The car's panel in dark paint."""
-    picture = render_stokes(scene("car", [bsdf_dict(GLOSSY)], (480, 320), 50.0, 215.0), spp=512)
+def fender(target: Path) -> None:
+    """The fender of a car in dark paint."""
+    picture = render_stokes(scene("fender", [bsdf_dict(GLOSSY)], (480, 320), 50.0, 215.0), spp=512)
     save_small(stokes_figure(picture, "σ = 0.01, n = 1.55, a = 0.08 under a clear sky"), target)
 
 
@@ -132,7 +132,7 @@ def save_small(figure: Any, target: Path) -> None:
 
 
 PICTURES: dict[str, Callable[[Path], None]] = {
-    "car": car,
+    "fender": fender,
     "spheres": spheres,
     "pbsdf-vs-plugin": pbsdf_vs_plugin,
     "inverse-rendering": inverse_rendering,

@@ -29,10 +29,12 @@ def render(
     models: Annotated[
         list[str] | None,
         model_argument(
-            "Models' JSON files, folders of fits, or bundled paints: one object each (on the car: one piece)."
+            "Models' JSON files, folders of fits, or bundled paints: one object each (on the fender: one piece)."
         ),
     ] = None,
-    scene: Annotated[str, typer.Option(help="sphere, plate, car, or a Mitsuba scene FILE.xml.")] = "sphere",
+    scene: Annotated[
+        str, typer.Option(help="sphere, plate, fender, or a Mitsuba scene FILE.xml.")
+    ] = "sphere",
     light: Annotated[
         str | None,
         typer.Option(help="point, area, sky, constant, or envmap:FILE.", show_default="sky"),
