@@ -28,7 +28,7 @@ from pbrdf.report.style import new_figure, save_figure, styled
 
 DOCS = Path(__file__).parents[1] / "docs"
 #: Size of the pictures in the documentation, in that of the command's.
-_SCALE = 0.62
+_SCALE = 0.5
 #: A dark, smooth car paint, and a semi-gloss one.
 GLOSSY = pbrdf.DoubleGauss(sigma=0.01, n=1.55, a=0.08, k=1.1, b=0.1, t=0.6)
 SEMIGLOSS = pbrdf.DoubleGauss(sigma=0.06, n=1.6, a=0.3, k=1.2, b=0.2, t=0.6)

@@ -44,8 +44,8 @@ class StokesPicture:
     attrs
         What was rendered, and how.
     surface
-        Which pixels show a surface and not what is behind all of them, the sky for instance; shape (rows, columns), None
-        where that is not known.
+        Which pixels show a surface and not what is behind all of them, the sky for instance; shape (rows, columns),
+        None where that is not known.
     """
 
     stokes: np.ndarray

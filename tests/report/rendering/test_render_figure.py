@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pbrdf.rendering.picture import StokesPicture
-from pbrdf.report.rendering.figure import channel_figure, polarizer_figure, stokes_figure
+from pbrdf.report.rendering.figure import channel_figure, colour_figure, polarizer_figure, stokes_figure
 from pbrdf.report.style import save_figure
 
 
@@ -119,3 +119,15 @@ def test_a_dark_picture_can_be_drawn(channel, tmp_path):
     dark = StokesPicture(np.zeros((4, 5, 6)), np.zeros((4, 5, 6)))
     save_figure(channel_figure(dark, channel, "nothing"), tmp_path / "dark.png")
     assert (tmp_path / "dark.png").stat().st_size > 2000
+
+
+def test_the_longest_wavelength_is_red():
+    pictures = []
+    for nm, brightness in ((450.0, 0.1), (650.0, 1.0), (550.0, 0.5)):
+        stokes = np.zeros((4, 6, 8))
+        stokes[0] = brightness
+        pictures.append(StokesPicture(stokes, np.zeros_like(stokes), {"wavelength": nm}))
+    ax = colour_figure(pictures, "a title").axes[0]
+    red, green, blue = np.asarray(image_of(ax).get_array())[0, 0]
+    assert red == 1.0 and red > green > blue
+    assert "650 nm, 550 nm, 450 nm as red, green, blue" in ax.get_title()

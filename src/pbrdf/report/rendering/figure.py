@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
 
     from pbrdf.rendering.picture import StokesPicture
 
-__all__ = ["channel_figure", "polarizer_figure", "stokes_figure"]
+__all__ = ["channel_figure", "colour_figure", "polarizer_figure", "stokes_figure"]
 
 #: Exponent with which radiances are shown, as on a screen; a few brightest pixels are left to saturate.
 _GAMMA, _BRIGHTEST = 1.0 / 2.2, 99.5
@@ -73,6 +74,33 @@ def stokes_figure(picture: StokesPicture, title: str) -> Figure:
         for ax, channel in zip(figure.subplots(2, 3).ravel(), _CHANNELS, strict=True):
             _draw(figure, ax, picture, channel)
         figure.suptitle(title, fontsize=11)
+        return figure
+
+
+def colour_figure(pictures: Sequence[StokesPicture], title: str) -> Figure:
+    """Three pictures of one scene as red, green and blue, the longest wavelength red, on one scale of radiance.
+
+    Parameters
+    ----------
+    pictures
+        With the attribute ``wavelength``, in any order.
+    title
+        What they show.
+    """
+    ordered = sorted(pictures, key=lambda picture: float(picture.attrs["wavelength"]), reverse=True)
+    radiance = np.stack([picture.stokes[0] for picture in ordered], axis=-1)
+    with styled():
+        width, height = _size(ordered[0], _LARGE)
+        figure = new_figure(width + 0.4, height + 0.8)
+        ax = figure.subplots()
+        ax.imshow(
+            np.clip(np.nan_to_num(radiance) / _brightest(radiance), 0.0, 1.0) ** _GAMMA,
+            interpolation="nearest",
+        )
+        _bare(ax)
+        shown = ", ".join(f"{float(picture.attrs['wavelength']):g} nm" for picture in ordered)
+        ax.set_title(f"radiance S0 at {shown} as red, green, blue", fontsize=9.5)
+        figure.suptitle(title, fontsize=10.5)
         return figure
 
 
