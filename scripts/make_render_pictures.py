@@ -1,4 +1,4 @@
-"""Make the rendered pictures of the documentation: ``docs/images/{fender,spheres,pbsdf-vs-plugin,inverse-rendering}.png``.
+"""Make the rendered pictures of the documentation: ``docs/images/{fender,spheres,pbsdf-vs-plugin,…}.png``.
 
 Run it with: python scripts/make_render_pictures.py [NAME …]   (needs mitsuba; minutes)
 """

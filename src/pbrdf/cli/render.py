@@ -154,8 +154,8 @@ def render(
     title = ", ".join(Path(source).name for source in sources) or Path(scene).name
     notes = {"models": title, "scene": scene, "light": lamp if own else "of the scene", "variant": variant}
     pictures: list[StokesPicture] = []
-    for number, nm in enumerate(colours):
-        coats = [bsdf_dict(models_of_one[number]) for _, models_of_one in painted]
+    for place, nm in enumerate(colours):
+        coats = [bsdf_dict(models_of_one[place]) for _, models_of_one in painted]
         if own:
             air = {"max_dolp": max_dolp, "optical_depth": optical_depth}
             stage = _stage(scene, coats, lamp, shape or (512, 512), sun_zenith, sun_azimuth, air, nm)
@@ -164,8 +164,8 @@ def render(
         at = "" if nm is None else f" at {nm:g} nm"
         with progress_bar(f"Rendering {scene}{at}", quiet) as progress:
             picture = render_stokes(stage, spp=spp, depth=depth, seed=seed, progress=progress)
-        stated: dict[str, str | float] = notes if nm is None else {**notes, "wavelength": nm}
-        pictures.append(replace(picture, attrs={**picture.attrs, **stated}))
+        stated: dict[str, float] = {} if nm is None else {"wavelength": nm}
+        pictures.append(replace(picture, attrs={**picture.attrs, **notes, **stated}))
     angles = [math.radians(a) for a in polarizer or ()]
     if len(pictures) > 1:
         written = _write_colours(pictures, target, title, angles)

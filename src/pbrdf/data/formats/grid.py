@@ -60,15 +60,16 @@ def to_grid(ds: xr.Dataset) -> xr.Dataset:
         )
     rows = np.argsort(place)
     coords: dict[str, object] = {name: (name, values, stored[name].attrs) for name, values in axes.items()}
-    for name, coordinate in stored.coords.items():
+    for key, coordinate in stored.coords.items():
+        name = str(key)
         if name in _AXES:
             continue
         if DIMENSION not in coordinate.dims:
-            coords[str(name)] = coordinate
+            coords[name] = coordinate
         elif (coordinate.values == coordinate.values[0]).all():
-            coords[str(name)] = ((), coordinate.values[0], coordinate.attrs)
+            coords[name] = ((), coordinate.values[0], coordinate.attrs)
         else:
-            coords[str(name)] = (_AXES, coordinate.values[rows].reshape(shape), coordinate.attrs)
+            coords[name] = (_AXES, coordinate.values[rows].reshape(shape), coordinate.attrs)
     data = {
         name: (
             (*_AXES, *array.dims[1:]),
