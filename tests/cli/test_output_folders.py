@@ -67,4 +67,4 @@ def test_a_plan_goes_into_a_folder(run, refused, tmp_path):
     fast = ("--smallest-bistatic", 30, "--largest-zenith", 70, "--budget", 12)
     run("plan", "matte-white-thick", *fast, "-o", "plans/next")
     assert sorted(p.name for p in (tmp_path / "plans" / "next").iterdir()) == ["plan.csv", "plan.png"]
-    assert refused("plan", "white", "-o", "x.txt").endswith("give a table, such as x.csv, or a folder")
+    assert refused("plan", "white", "-o", "x.txt").endswith("must be .csv; or give a folder")

@@ -125,14 +125,12 @@ def plan(
 
     if noise is not None and instrument is not None:
         raise PbrdfError("--noise and --instrument exclude each other: choose one")
-    into = not output.suffix or output.is_dir()
+    into = not output.suffix or (output.is_dir() and output.suffix.lower() != ".csv")
     if into:
         ready_folder(output)
         output /= "plan.csv"
     elif output.suffix.lower() != ".csv":
-        raise PbrdfError(
-            f"--output {output}: give a table, such as {output.with_suffix('.csv')}, or a folder"
-        )
+        raise PbrdfError(f"--output {output}: the extension must be .csv; or give a folder")
     picture = output.with_suffix(".png")
     for file in (output, picture) if not into else ():
         require_folder_of(file)
