@@ -22,7 +22,7 @@ from pbrdf.presentation import provide_presenter
 from pbrdf.version import __version__
 
 if TYPE_CHECKING:
-    from pbrdf.data import check, make_dataset, read, validate, write
+    from pbrdf.data import check, convert, make_dataset, read, validate, write
     from pbrdf.data.paints import PAINTS, load_paint, open_experiment
     from pbrdf.data.readers import register_reader
     from pbrdf.explorer.explore import explore
@@ -119,6 +119,8 @@ _HOME = {
     "check": "pbrdf.data",
     "validate": "pbrdf.data",
     "open_experiment": "pbrdf.data.paints",
+    # what other programs give, in our convention
+    "convert": "pbrdf.data",
     # fit
     "fit": "pbrdf.inversion",
     "FitResult": "pbrdf.inversion",
@@ -223,6 +225,7 @@ __all__ = [
     "coherency_eigenvalues",
     "compare",
     "contour",
+    "convert",
     "cross_validate",
     "directional_hemispherical_reflectance",
     "division_of_focal_plane",
