@@ -85,7 +85,7 @@ if TYPE_CHECKING:
     )
     from pbrdf.models.reflectance import directional_hemispherical_reflectance
     from pbrdf.optics.mueller import coherency_eigenvalues
-    from pbrdf.optics.stokes import aolp, docp, dolp, dop
+    from pbrdf.optics.stokes import aolp, docp, dolp, dop, ellipticity
     from pbrdf.planning.plan import plan
     from pbrdf.rendering.bsdf import register as register_bsdf
     from pbrdf.rendering.export import write_merl, write_pbsdf
@@ -110,6 +110,7 @@ _HOME = {
     "dolp": "pbrdf.optics.stokes",
     "docp": "pbrdf.optics.stokes",
     "aolp": "pbrdf.optics.stokes",
+    "ellipticity": "pbrdf.optics.stokes",
     "coherency_eigenvalues": "pbrdf.optics.mueller",
     # data sets
     "read": "pbrdf.data",
@@ -232,6 +233,7 @@ __all__ = [
     "docp",
     "dolp",
     "dop",
+    "ellipticity",
     "error_analysis",
     "explore",
     "fit",

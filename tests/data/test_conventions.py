@@ -159,6 +159,7 @@ def test_a_perfect_diffuser_has_reflectance_factor_one_and_brdf_one_over_pi():
         ([2, 1, 0, 0], 0.5, 0.0),
         ([2, -1, 0, 0], 0.5, np.pi / 2),
         ([2, -1, -0.0, 0], 0.5, np.pi / 2),
+        ([2, -1, -1e-17, 0], 0.5, np.pi / 2),
         ([2, 0, 2, 0], 1.0, np.pi / 4),
         ([2, 0, -2, 0], 1.0, -np.pi / 4),
         ([2, 0, 0, 2], 0.0, 0.0),

@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 from pbrdf.backend import get_backend
-from pbrdf.optics.stokes import aolp, docp, dolp, dop
+from pbrdf.optics.stokes import aolp, docp, dolp, dop, ellipticity
 
 S = np.array([[2.0, 0.6, 0.8, 0.0], [1.0, -1.0, 0.0, 0.0], [4.0, 0.0, 0.0, -2.0], [1.0, 0.0, 0.5, 0.5]])
 EXPECTED = {
@@ -15,6 +15,7 @@ EXPECTED = {
     docp: [0.0, 0.0, 0.5, 0.5],
     dop: [0.5, 1.0, 0.5, np.sqrt(0.5)],
     aolp: [0.5 * np.arctan2(0.8, 0.6), np.pi / 2, 0.0, np.pi / 4],
+    ellipticity: [0.0, 0.0, -np.pi / 4, np.pi / 8],
 }
 
 
@@ -54,3 +55,34 @@ def test_invariance(function):
 def test_no_light_is_nan_without_a_warning(function):
     """Where I = 0 there is no light and the result is NaN (module docstring)."""
     assert np.isnan(function(np.zeros((2, 4)))).all()
+
+
+@pytest.mark.parametrize("u", [0.0, -0.0, -1e-17, 1e-17])
+def test_light_along_s_is_at_plus_a_right_angle(u):
+    """(−π/2, π/2] has one value for it, whatever the rounding of U; equal pixels read alike."""
+    stokes = np.array([[1.0, -1.0, u, 0.0]])
+    module = get_backend().module
+    assert aolp(stokes)[0] == aolp(xr.DataArray(stokes, dims=("x", "stokes")))[0] == np.pi / 2
+    assert aolp(module.Array4f64(*stokes.T)).numpy()[0] == np.pi / 2
+    assert aolp(module.Array4f(*stokes.T.astype(np.float32))).numpy()[0] == pytest.approx(np.pi / 2, abs=1e-6)
+
+
+def test_ellipticity_is_that_of_the_polarised_part():
+    """Natural light added and the frame turned change nothing; an ellipse is found again (pypolar: asin(V/I)/2)."""
+    angles = np.linspace(-np.pi / 4, np.pi / 4, 9)
+    for share in (1.0, 0.3, 1e-3):
+        for axis in (0.0, 0.4, np.pi / 4, -1.2):
+            flat = share * np.cos(2 * angles)
+            stokes = np.stack(
+                [
+                    0 * angles + 1,
+                    flat * np.cos(2 * axis),
+                    flat * np.sin(2 * axis),
+                    share * np.sin(2 * angles),
+                ],
+                -1,
+            )
+            np.testing.assert_allclose(ellipticity(stokes), angles, atol=1e-14)
+    assert ellipticity([1.0, 0.0, 0.0, 0.3]) == np.pi / 4
+    assert np.tan(ellipticity([1.0, 0.6, 0.0, 0.8])) == pytest.approx(0.5)
+    assert np.tan(ellipticity([1.0, 0.0, 0.6, 0.8])) == pytest.approx(0.5)
