@@ -15,7 +15,7 @@ PAGE = (ROOT / "docs" / "neighbours.md").read_text(encoding="utf-8")
 
 
 def test_every_finding_is_linked_and_every_link_leads_somewhere():
-    linked = {path for path in re.findall(r"\]\(\.\./([^)#]+)\)", PAGE)}
+    linked = set(re.findall(r"\]\(\.\./([^)#]+)\)", PAGE))
     assert [path for path in linked if not (ROOT / path).exists()] == []
     assert {path.relative_to(ROOT).as_posix() for path in (ROOT / "findings").glob("*.sh")} <= linked
 
@@ -29,7 +29,7 @@ def test_versions_of_the_page_are_those_of_the_scripts(script):
     )
     row = PAGE[: PAGE.index(script.name)].rpartition(f"| {name} {version}")
     assert row[1], f"{name} {version}"
-    assert not re.search(r"^\| [A-Za-z]", row[2].replace(row[1], ""), re.MULTILINE)
+    assert not re.search(r"^\| [A-Za-z]", row[2], re.MULTILINE)
 
 
 def test_versions_of_the_numbers_are_those_of_the_page():

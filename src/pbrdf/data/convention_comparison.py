@@ -23,7 +23,7 @@ ROUNDING = 1e-5
 #: Another convention fits better where it leaves this share of the difference or less.
 BETTER = 0.5
 #: Signs of Q, U and V by which theirs become ours.
-Signs = tuple[int, int, int]
+Signs = tuple[int, ...]
 
 
 @dataclass(frozen=True)
@@ -161,8 +161,7 @@ def named_signs(signs: Signs) -> str:
 
 
 def _signs_of(program: str) -> Signs:
-    q, u, v = (int(s) for s in PROGRAMS[program](np.ones((4, 4)))[0, 1:])
-    return q, u, v
+    return tuple(int(sign) for sign in PROGRAMS[program](np.ones((4, 4)))[0, 1:])
 
 
 def _with(signs: Signs, matrices: np.ndarray) -> np.ndarray:
