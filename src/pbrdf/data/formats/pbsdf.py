@@ -77,6 +77,7 @@ def mueller_to_pbsdf(
     theta_h, theta_d, phi_d
         Radians, shape (...).
     """
+    # its own inverse
     return from_mitsuba_mueller(to_scattering_plane(mueller, theta_h, theta_d, phi_d))
 
 
