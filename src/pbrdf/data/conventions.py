@@ -196,9 +196,7 @@ def dolp_aolp_from_stokes(stokes: ArrayLike) -> tuple[NDArray[np.float64], NDArr
     intensity, q, u = array[..., 0], array[..., 1], array[..., 2]
     linear = np.hypot(q, u)
     dolp = np.divide(linear, intensity, out=np.full_like(linear, np.nan), where=intensity != 0)
-    angle = 0.5 * np.arctan2(u, q)
-    # a U of −0.0, or lost beside Q, keeps light along s at +π/2
-    return dolp, angle + np.pi * (angle <= -np.pi / 2)
+    return dolp, within_half_turn(0.5 * np.arctan2(u, q), 0.5 * np.pi)
 
 
 def qu_from_dolp_aolp(

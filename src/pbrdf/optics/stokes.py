@@ -7,6 +7,7 @@ I = 0 there is no light and a degree is NaN.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 __all__ = ["STOKES", "aolp", "docp", "dolp", "dop", "ellipticity"]
@@ -33,23 +34,6 @@ def dop(stokes: Any) -> Any:
     return _ratio(_sqrt(q * q + u * u + v * v), intensity)
 
 
-def aolp(stokes: Any) -> Any:
-    """Angle of linear polarisation ½ atan2(U, Q) in radians, within (−π/2, π/2], from p towards s.
-
-    Light along s is at π/2 whatever the sign of a U that is 0 or lost beside Q; without linear polarisation it is 0.
-    """
-    _, q, u, _ = _components(stokes)
-    if _is_drjit(stokes):
-        import drjit as dr
-
-        angle = 0.5 * dr.atan2(u, q)
-        return dr.select(angle <= -0.5 * dr.pi, angle + dr.pi, angle)
-    import numpy as np
-
-    angle = 0.5 * np.arctan2(u, q)
-    return angle + np.pi * (angle <= -0.5 * np.pi)
-
-
 def ellipticity(stokes: Any) -> Any:
     """Ellipticity angle ½ atan2(V, √(Q² + U²)) in radians, within [−π/4, π/4], V > 0 (left circular) positive.
 
@@ -65,6 +49,25 @@ def ellipticity(stokes: Any) -> Any:
     import numpy as np
 
     return 0.5 * np.arctan2(v, linear)
+
+
+def aolp(stokes: Any) -> Any:
+    """Angle of linear polarisation ½ atan2(U, Q) in radians, within (−π/2, π/2], from p towards s.
+
+    Light along s is at π/2 whatever the sign of a U that is zero or rounds to it.
+    """
+    _, q, u, _ = _components(stokes)
+    right = 0.5 * math.pi
+    if _is_drjit(stokes):
+        import drjit as dr
+
+        angle = 0.5 * dr.atan2(u, q)
+        return dr.select(angle <= -right, right, angle)
+    import numpy as np
+
+    angle = 0.5 * np.arctan2(u, q)
+    # -π/2 alone lies at or below the open end: the other end is the same direction
+    return angle + np.pi * (angle <= -right)
 
 
 def _is_drjit(value: Any) -> bool:
