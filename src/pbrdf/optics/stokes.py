@@ -28,12 +28,6 @@ def docp(stokes: Any) -> Any:
     return _ratio(abs(v), intensity)
 
 
-def dop(stokes: Any) -> Any:
-    """Degree of polarisation, √(Q² + U² + V²)/I."""
-    intensity, q, u, v = _components(stokes)
-    return _ratio(_sqrt(q * q + u * u + v * v), intensity)
-
-
 def ellipticity(stokes: Any) -> Any:
     """Ellipticity angle ½ atan2(V, √(Q² + U²)) in radians, within [−π/4, π/4], V > 0 (left circular) positive.
 
@@ -49,6 +43,12 @@ def ellipticity(stokes: Any) -> Any:
     import numpy as np
 
     return 0.5 * np.arctan2(v, linear)
+
+
+def dop(stokes: Any) -> Any:
+    """Degree of polarisation, √(Q² + U² + V²)/I."""
+    intensity, q, u, v = _components(stokes)
+    return _ratio(_sqrt(q * q + u * u + v * v), intensity)
 
 
 def aolp(stokes: Any) -> Any:
