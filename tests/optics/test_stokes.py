@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+import pbrdf
 from pbrdf.backend import get_backend
 from pbrdf.data.conventions import dolp_aolp_from_stokes
 from pbrdf.optics.stokes import aolp, docp, dolp, dop
@@ -16,6 +17,7 @@ EXPECTED = {
     docp: [0.0, 0.0, 0.5, 0.5],
     dop: [0.5, 1.0, 0.5, np.sqrt(0.5)],
     aolp: [0.5 * np.arctan2(0.8, 0.6), np.pi / 2, 0.0, np.pi / 4],
+    pbrdf.ellipticity: [0.0, 0.0, -np.pi / 4, np.pi / 8],
 }
 
 
@@ -39,6 +41,27 @@ def test_xarray(function, dim):
 def test_drjit(function):
     module = get_backend().module
     np.testing.assert_allclose(function(module.Array4f64(*S.T)).numpy(), EXPECTED[function], atol=1e-15)
+
+
+def test_ellipticity_is_that_of_the_polarised_part():
+    """Natural light added and the frame turned change nothing; an ellipse is found again (pypolar: asin(V/I)/2)."""
+    angles = np.linspace(-np.pi / 4, np.pi / 4, 9)
+    for share in (1.0, 0.3, 1e-3):
+        for axis in (0.0, 0.4, np.pi / 4, -1.2):
+            flat = share * np.cos(2 * angles)
+            stokes = np.stack(
+                [
+                    0 * angles + 1,
+                    flat * np.cos(2 * axis),
+                    flat * np.sin(2 * axis),
+                    share * np.sin(2 * angles),
+                ],
+                -1,
+            )
+            np.testing.assert_allclose(pbrdf.ellipticity(stokes), angles, atol=1e-14)
+    assert pbrdf.ellipticity([1.0, 0.0, 0.0, 0.3]) == np.pi / 4
+    assert np.tan(pbrdf.ellipticity([1.0, 0.6, 0.0, 0.8])) == pytest.approx(0.5)
+    assert np.tan(pbrdf.ellipticity([1.0, 0.0, 0.6, 0.8])) == pytest.approx(0.5)
 
 
 @pytest.mark.parametrize("function", [dolp, docp, dop])

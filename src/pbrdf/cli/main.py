@@ -54,6 +54,7 @@ COMMANDS = {
     "export": "export",
     "check": "check",
     "convert": "convert",
+    "compare-with": "compare_with:compare_with",
     "paints": "lists",
     "models": "lists",
     "doctor": "doctor",

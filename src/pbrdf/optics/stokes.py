@@ -1,8 +1,8 @@
-"""Degree and angle of polarisation of Stokes vectors (I, Q, U, V) with Q = I_p − I_s.
+"""Degree, angle and ellipticity of polarisation of Stokes vectors (I, Q, U, V) with Q = I_p − I_s.
 
 Each function takes a Stokes array of any kind and returns the same kind: NumPy arrays and sequences of
 shape (..., 4), xarray arrays with a dimension ``stokes_out`` (or ``stokes``), Dr.Jit ``Array4f`` values. Where
-I = 0 there is no light and the result is NaN.
+I = 0 there is no light and a degree is NaN.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-__all__ = ["STOKES", "aolp", "docp", "dolp", "dop"]
+__all__ = ["STOKES", "aolp", "docp", "dolp", "dop", "ellipticity"]
 
 #: The Stokes parameters in their order.
 STOKES = ("I", "Q", "U", "V")
@@ -26,6 +26,23 @@ def docp(stokes: Any) -> Any:
     """Degree of circular polarisation, |V|/I."""
     intensity, _, _, v = _components(stokes)
     return _ratio(abs(v), intensity)
+
+
+def ellipticity(stokes: Any) -> Any:
+    """Ellipticity angle ½ atan2(V, √(Q² + U²)) in radians, within [−π/4, π/4], V > 0 (left circular) positive.
+
+    Its tangent is the ratio of the short to the long axis of the ellipse of the polarised part: natural light added to
+    a beam does not change it, nor does a turn of the frame. Without polarisation it is 0.
+    """
+    _, q, u, v = _components(stokes)
+    linear = _sqrt(q * q + u * u)
+    if _is_drjit(stokes):
+        import drjit as dr
+
+        return 0.5 * dr.atan2(v, linear)
+    import numpy as np
+
+    return 0.5 * np.arctan2(v, linear)
 
 
 def dop(stokes: Any) -> Any:

@@ -46,6 +46,17 @@ def test_the_summary_names_everything(report):
     assert max(len(line) for line in text.splitlines()) <= 110
 
 
+@pytest.mark.slow
+def test_values_that_are_not_numbers_are_left_out_with_a_word(report):
+    """The number of NaN stands beside the number of values, and nothing is said where there is none."""
+    assert "NaN" not in summary_text(report)
+    dataset = pbrdf.open_experiment("cd-back")
+    dataset["Q"][:20] = np.nan
+    result = pbrdf.fit(dataset, starts=4)
+    text = " ".join(summary_text(Report(result, dataset, "holes")).split())
+    assert "232 measured values of I, Q, U, V (20 more are NaN and left out)" in text
+
+
 def test_the_summary_of_assumed_noise_is_called_relative(hemisphere_report):
     text = summary_text(hemisphere_report)
     assert "relative only, as the data state no uncertainty" in text

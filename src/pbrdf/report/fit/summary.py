@@ -194,8 +194,11 @@ def _heading(report: Report) -> list[tuple[str, list[str]]]:
     options = [f"{k}={v}" for k, v in model.chosen.items() if v != model.options[k][0]]
     title = ds.attrs.get("title")
     count = f"{total - held} of {total} geometries" if held else f"{total} geometries"
+    fitted = result.data
+    missing = fitted.std.size - fitted.count - fitted.unstated
+    left_out = f" ({missing} more are NaN and left out)" if missing else ""
     data = (
-        f"{count}, {result.goodness.data} measured values of {_channels(result)}; "
+        f"{count}, {result.goodness.data} measured values of {_channels(result)}{left_out}; "
         f"{wavelengths_in_words(ds)}, {illumination_in_words(ds)}"
     )
     rows = [
