@@ -205,11 +205,11 @@ function noticesOf(app) {
     if (!stays) timer = setTimeout(() => { box.hidden = true; }, 12000);
   });
   const node = element("div", { class: "notices" }, gone, box);
-  node.lost = is => {
+  node.lost = (is, why) => {
     gone.hidden = lost.hidden = !is;
-    lost.textContent = is ? "The program behind this page does not answer; trying again. If it has ended, start pbrdf explore anew and open the address that it tells: the part of this page's address after # shows the same there." : "";
+    lost.textContent = !is ? "" : why ? `This page cannot be served: ${why}; trying again.` : "The program behind this page does not answer; trying again. If it has ended, start pbrdf explore anew and open the address that it tells: the part of this page's address after # shows the same there.";
   };
-  app.on("disconnected", () => node.lost(true));
+  app.on("disconnected", why => node.lost(true, why));
   return node;
 }
 

@@ -85,6 +85,7 @@ PANELS.push({
       offButton.textContent = off.length ? `Switch ${off.length} ${off.length === 1 ? "point" : "points"} on again` : "All points are switched on";
     };
     app.on("answer:data", content => { fault.textContent = ""; build(content); });
+    app.on("connected", () => { if (app.state) ask(); });
     // what has just been opened is shown
     app.on("answer:opened", ({ datasets }) => {
       if (!app.state || !datasets?.length) return;

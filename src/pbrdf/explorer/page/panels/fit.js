@@ -42,14 +42,15 @@ PANELS.push({
       cancel.disabled = !on;
       if (!on) bar.value = 0;
     };
-    // The values go to the sliders, one step of undo.
+    // The values go to the sliders, one step of undo; models may have come and gone meanwhile.
     const takeOver = fit => {
-      const layer = app.state.layers[fit.layer];
-      if (!layer || layer.model !== fit.model) {
+      const { layers } = app.state, is = layer => layer?.model === fit.model && layer.name === fit.name;
+      const index = is(layers[fit.layer]) ? fit.layer : layers.findIndex(is);
+      if (index < 0) {
         status.textContent = "The model that was fitted is not shown any more: its values were not taken over.";
         return;
       }
-      app.change(state => { Object.assign(state.layers[fit.layer].parameters, fit.values); });
+      app.change(state => { Object.assign(state.layers[index].parameters, fit.values); });
     };
     app.on("answer:fit_started", () => { run(true); fault.textContent = ""; wanted = 1; status.textContent = "Fitting …"; bar.removeAttribute("value"); });
     app.on("answer:fit_progress", ({ done, of, chi2 }) => {
