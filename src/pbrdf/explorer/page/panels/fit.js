@@ -29,7 +29,7 @@ PANELS.push({
       list.replaceChildren(...app.catalogue.models[model].parameters.map(p => {
         const box = element("input", { type: "checkbox", onchange: () => set(settings => {
           // those that a fit holds by default are freed by name, the others held by name
-          const key = p.fitted ? "held" : "free", names = new Set(settings[key] ?? []);
+          const key = p.fitted ? "held" : "free", names = new Set(listOf(settings[key]));
           if (box.checked === p.fitted) names.delete(p.name); else names.add(p.name);
           settings[key] = [...names];
         }) });
@@ -78,7 +78,8 @@ PANELS.push({
     });
     return {
       update(state) {
-        const { model } = state.layers[state.active], { held = [], free = [], starts: count = 16 } = state.settings.fit ?? {};
+        const { model } = state.layers[state.active], { starts: count = 16, ...settings } = state.settings.fit ?? {};
+        const held = listOf(settings.held), free = listOf(settings.free);
         if (shown !== model) { rebuild(model); shown = model; }
         for (const { box, p } of boxes.values()) box.checked = p.fitted ? !held.includes(p.name) : free.includes(p.name);
         if (starts.getRootNode().activeElement !== starts) starts.value = count;
