@@ -372,6 +372,20 @@ def test_axe_finds_no_serious_fault(served, page, white, what):
     assert len(papers) == 2
 
 
+def test_an_enlarged_view_is_wider_and_in_sight(served, page, white):
+    page.set_viewport_size({"width": 1700, "height": 900})
+    page.goto(served(lambda: Workspace([("thick", white)])))
+    page.wait_for_selector(".card canvas")
+    stage = page.locator(".stage").bounding_box()
+    for view in ("Hemisphere", "Curves", "Lit ball"):
+        button = page.get_by_role("button", name=f"Enlarge {view}")
+        button.click()
+        card = page.get_by_role("article", name=view).bounding_box()
+        assert card["width"] > 0.9 * stage["width"]
+        assert -1.0 <= card["y"] < 900
+        button.click()
+
+
 def test_from_a_phone_to_a_wall(opened):
     page = opened("thick")
     for width, height in ((360, 740), (768, 1024), (1280, 800), (3840, 2160)):

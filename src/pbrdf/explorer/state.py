@@ -184,11 +184,13 @@ def _light(content: Any) -> Light:
     if not 0.0 <= theta_i <= 90.0:
         raise StateError("light.theta_i", "the angle of incidence is within 0 … 90 degrees")
     stokes = _sequence(light.get("stokes", [1.0, 0.0, 0.0, 0.0]), "light.stokes", 4)
-    numbers = [number(s, "light.stokes") for s in stokes]
     try:
-        S = check_incident(numbers)
-    except (ModelError, TypeError, ValueError) as error:
-        raise StateError("light.stokes", str(error)) from None
+        S = check_incident([number(s, "light.stokes") for s in stokes])
+    except (PbrdfError, TypeError, ValueError):
+        raise StateError(
+            "light.stokes",
+            "light has four numbers I, Q, U, V, with I > 0 and √(Q² + U² + V²) no larger than I",
+        ) from None
     return Light(theta_i, (S[0], S[1], S[2], S[3]))
 
 
