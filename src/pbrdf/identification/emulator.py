@@ -73,7 +73,8 @@ class Emulator:
         def around(centre: np.ndarray, steps: np.ndarray) -> np.ndarray:
             """(…, P) to (…, 1 + 2 P, P)."""
             offsets = np.concatenate([np.zeros((1, size)), np.diag(steps), -np.diag(steps)])
-            return np.clip(centre[..., None, :] + offsets, low, high)
+            values: np.ndarray = np.clip(centre[..., None, :] + offsets, low, high)
+            return values
 
         at = around(mean, spread)
         _, slopes = _signal(material, at, data)

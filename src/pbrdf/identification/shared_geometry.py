@@ -139,7 +139,8 @@ class SharedGeometry:
         means = np.array([np.swapaxes(e.table[middle, ..., 0], 0, 1).ravel()[own] for e in self.emulators])
         weights = 1.0 / std[:, own] ** 2
         along = (weights * values[:, own]) @ means.T
-        return np.log(np.maximum(along / np.maximum(weights @ (means**2).T, 1e-300), 1e-12))
+        found: np.ndarray = np.log(np.maximum(along / np.maximum(weights @ (means**2).T, 1e-300), 1e-12))
+        return found
 
     def _exact(
         self, kind: np.ndarray, pixel: np.ndarray, values: np.ndarray, std: np.ndarray
