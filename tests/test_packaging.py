@@ -1,0 +1,173 @@
+"""What a release promises: extras that hold what is imported, one version everywhere, workflows and hooks that parse."""
+
+from __future__ import annotations
+
+import ast
+import re
+import shlex
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+import yaml
+
+import pbrdf
+
+ROOT = Path(__file__).parents[1]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+#: Modules of distributions where these are called otherwise.
+MODULES = {
+    "axe-playwright-python": {"axe_playwright_python"},
+    "dask": {"dask", "distributed"},
+    "import-linter": {"importlinter", "grimp"},
+    "karellen-llvm-core": set(),
+    "pillow": {"PIL"},
+    "pytest-xdist": {"xdist"},
+    "python-calamine": {"python_calamine"},
+    "pyyaml": {"yaml"},
+    "scikit-learn": {"sklearn"},
+}
+#: Extras for those who work on the package.
+FOR_DEVELOPERS = ("dev", "docs")
+
+
+def modules(requirements):
+    """Modules by distribution, of requirements as pyproject writes them."""
+    names = [re.match(r"[\w-]+", requirement)[0] for requirement in requirements]
+    return {name: MODULES.get(name, {name.replace("-", "_")}) for name in names}
+
+
+def imported(*folders):
+    """Top names of the modules of others that the Python files in folders import."""
+    found = set()
+    for path in (path for folder in folders for path in (ROOT / folder).rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Import):
+                found |= {alias.name.partition(".")[0] for alias in node.names}
+            elif isinstance(node, ast.ImportFrom) and not node.level:
+                found.add(node.module.partition(".")[0])
+            elif isinstance(node, ast.Call) and ast.unparse(node.func) == "pytest.importorskip":
+                found.add(node.args[0].value.partition(".")[0])
+    return found - sys.stdlib_module_names - {"pbrdf"}
+
+
+@pytest.fixture(scope="module")
+def of_users():
+    """Modules by distribution that users can have installed with the package."""
+    extras = PROJECT["project"]["optional-dependencies"]
+    asked = [r for name, extra in extras.items() if name not in FOR_DEVELOPERS for r in extra]
+    return modules([*PROJECT["project"]["dependencies"], *asked])
+
+
+def test_what_the_package_imports_is_declared(of_users):
+    assert imported("src") <= set().union(*of_users.values())
+
+
+def test_what_is_declared_is_imported(of_users):
+    used = imported("src")
+    assert [name for name, found in of_users.items() if found and not found & used] == []
+    # no module: its library is looked for by the name of the distribution
+    without = [name for name, found in of_users.items() if not found]
+    backend = (ROOT / "src" / "pbrdf" / "backend.py").read_text(encoding="utf-8")
+    assert without == ["karellen-llvm-core"]
+    assert '"karellen-llvm-core"' in backend
+
+
+@pytest.mark.parametrize("extra", FOR_DEVELOPERS)
+def test_what_developers_install_is_used(extra):
+    used = imported("tests", "benchmarks", "scripts", "docs")
+    files = [ROOT / "Makefile", *(ROOT / "docs").glob("*.py")]
+    tools = " ".join(path.read_text(encoding="utf-8") for path in files)
+    commands = {"import-linter": "lint-imports", "pytest-xdist": "-n auto"}
+    asked = modules(PROJECT["project"]["optional-dependencies"].get(extra, []))
+    idle = [
+        name
+        for name, found in asked.items()
+        if not found & used
+        and commands.get(name, name) not in tools
+        and not any(module in tools for module in found)
+    ]
+    assert idle == []
+
+
+def test_one_version_everywhere():
+    changelog = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    version, date = re.search(
+        r"^## \[(\d+\.\d+\.\d+)\] - (\d{4}-\d{2}-\d{2})$", changelog, re.MULTILINE
+    ).groups()
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    assert pbrdf.__version__ == version == citation["version"]
+    assert citation["date-released"].isoformat() == date
+    assert citation["license"] == PROJECT["project"]["license"]
+    assert "## [Unreleased]" in changelog
+
+
+def test_the_python_that_is_declared_is_tested():
+    classified = {
+        line.rpartition(" ")[2]
+        for line in PROJECT["project"]["classifiers"]
+        if re.search(r":: 3\.\d+$", line)
+    }
+    matrix = workflow("tests")["jobs"]["test"]["strategy"]["matrix"]
+    assert set(matrix["python"]) == classified
+    assert PROJECT["project"]["requires-python"] == f">={min(matrix['python'])}"
+    assert {name.partition("-")[0] for name in matrix["os"]} == {"ubuntu", "macos", "windows"}
+
+
+def workflow(name):
+    return yaml.safe_load((ROOT / ".github" / "workflows" / f"{name}.yml").read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("name", ["tests", "release"])
+def test_workflows_parse(name):
+    content = workflow(name)
+    # YAML 1.1 reads the key `on` as true
+    assert set(content) >= {"name", True, "jobs", "permissions"}
+    for job in content["jobs"].values():
+        assert set(job.get("needs", "build").split()) <= set(content["jobs"])
+        for step in job["steps"]:
+            assert ("uses" in step) != ("run" in step)
+            assert "@" in step.get("uses", "@")
+            assert shlex.split(step.get("run", "true"), comments=True)
+
+
+def test_the_built_wheel_is_tested_and_not_the_checkout():
+    steps = [step.get("run", "") for step in workflow("tests")["jobs"]["test"]["steps"]]
+    said = "\n".join(steps)
+    assert "editable" not in said
+    assert " -e " not in said
+    assert "rm -r src" in said
+    wanted = re.search(r"\$\{wheel\}\[([\w,]+)\]", said)[1].split(",")
+    assert set(wanted) == set(PROJECT["project"]["optional-dependencies"]) - set(FOR_DEVELOPERS)
+
+
+def test_only_the_upload_may_ask_for_an_identity():
+    jobs = workflow("release")["jobs"]
+    assert [name for name, job in jobs.items() if "id-token" in job.get("permissions", {})] == ["publish"]
+    assert workflow("release")[True] == {"push": {"tags": ["v*"]}}
+
+
+def test_hooks_are_the_checks_of_make_lint():
+    config = yaml.safe_load((ROOT / ".pre-commit-config.yaml").read_text(encoding="utf-8"))
+    hooks = [hook for repo in config["repos"] for hook in repo["hooks"]]
+    assert {repo["repo"] for repo in config["repos"]} == {"local"}
+    assert {hook["language"] for hook in hooks} == {"system"}
+    lint = re.search(
+        r"^lint:.*\n((?:\t.*\n)+)", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE
+    )[1]
+    tools = {line.split("$(BIN)/")[1].split()[0] for line in lint.splitlines()}
+    assert {hook["entry"].split()[0] for hook in hooks} == tools
+
+
+def test_the_source_distribution_holds_what_its_tests_read():
+    listed = PROJECT["tool"]["hatch"]["build"]["targets"]["sdist"]["include"]
+    assert [name for name in listed if not (ROOT / name).exists()] == []
+    assert set(listed) >= {
+        "src",
+        "tests",
+        ".github",
+        ".pre-commit-config.yaml",
+        "CITATION.cff",
+        "CONTRIBUTING.md",
+    }
