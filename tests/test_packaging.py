@@ -5,8 +5,10 @@ from __future__ import annotations
 import functools
 import re
 import shlex
+import subprocess
 import sys
 import tomllib
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -134,7 +136,7 @@ def test_the_built_wheel_is_tested_and_not_the_checkout():
     said = "\n".join(steps)
     assert "editable" not in said
     assert " -e " not in said
-    assert "rm -r src" in said
+    assert "'site-packages' in pbrdf.__file__" in said
     wanted = re.search(r"\$\{wheel\}\[([\w,]+)\]", said)[1].split(",")
     assert set(wanted) == set(PROJECT["project"]["optional-dependencies"]) - set(FOR_DEVELOPERS)
 
@@ -168,3 +170,17 @@ def test_the_source_distribution_holds_what_its_tests_read():
         "CITATION.cff",
         "CONTRIBUTING.md",
     }
+
+
+@pytest.mark.slow
+def test_the_wheel_holds_every_file_of_the_package(tmp_path):
+    pytest.importorskip("hatchling", reason="the wheel is built by hatchling")
+    command = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(tmp_path)]
+    subprocess.run(command, cwd=ROOT, check=True, capture_output=True)
+    (wheel,) = tmp_path.glob(f"pbrdf-{pbrdf.__version__}-py3-none-any.whl")
+    with zipfile.ZipFile(wheel) as archive:
+        packed = {name for name in archive.namelist() if ".dist-info/" not in name}
+    package = ROOT / "src" / "pbrdf"
+    files = (path for path in package.rglob("*") if path.is_file() and path.suffix != ".pyc")
+    assert packed == {path.relative_to(package.parent).as_posix() for path in files}
+    assert {"pbrdf/py.typed", "pbrdf/explorer/page/index.html", "pbrdf/report/templates/page.html"} <= packed
