@@ -78,7 +78,7 @@ def test_what_developers_install_is_used(extra):
     used = set().union(*map(imported, ("src", "tests", "benchmarks", "scripts", "docs")))
     files = [ROOT / "Makefile", *(ROOT / "docs").glob("*.py")]
     tools = " ".join(path.read_text(encoding="utf-8") for path in files)
-    commands = {"import-linter": "lint-imports", "pytest-xdist": "-n auto"}
+    commands = {"import-linter": "lint-imports", "ipykernel": "myst_nb", "pytest-xdist": "-n auto"}
     asked = modules(PROJECT["project"]["optional-dependencies"].get(extra, []))
     idle = [
         name
