@@ -346,6 +346,15 @@ def test_what_cannot_be_fitted_is_said_clearly(arguments, message):
         pbrdf.fit(pbrdf.open_experiment("cd-back"), **arguments)
 
 
+def test_a_held_out_fraction_may_be_given_in_per_cent():
+    dataset = pbrdf.open_experiment("matte-white-thick")
+    by_share, by_per_cent = (
+        pbrdf.HoldOut.parse(text).mask(dataset) for text in ("fraction=0.25", "fraction=25%")
+    )
+    assert by_share.sum() > 0
+    np.testing.assert_array_equal(by_share, by_per_cent)
+
+
 def test_too_few_values_are_refused():
     dataset = pbrdf.open_experiment("cd-back").isel(geometry=slice(0, 1))
     with pytest.raises(FitError, match="4 measured values cannot determine 6 parameters"):

@@ -7,6 +7,7 @@ import pytest
 import xarray as xr
 
 from pbrdf.backend import get_backend
+from pbrdf.data.conventions import dolp_aolp_from_stokes
 from pbrdf.optics.stokes import aolp, docp, dolp, dop
 
 S = np.array([[2.0, 0.6, 0.8, 0.0], [1.0, -1.0, 0.0, 0.0], [4.0, 0.0, 0.0, -2.0], [1.0, 0.0, 0.5, 0.5]])
@@ -54,3 +55,12 @@ def test_invariance(function):
 def test_no_light_is_nan_without_a_warning(function):
     """Where I = 0 there is no light and the result is NaN (module docstring)."""
     assert np.isnan(function(np.zeros((2, 4)))).all()
+
+
+@pytest.mark.parametrize("u", [0.0, -0.0, 1e-17, -1e-17, -1e-300])
+def test_light_along_s_is_at_plus_90_degrees_whatever_the_sign_of_a_u_that_is_zero(u):
+    stokes = [1.0, -1.0, u, 0.0]
+    assert aolp(stokes) == np.pi / 2
+    assert dolp_aolp_from_stokes(stokes)[1] == np.pi / 2
+    assert aolp(xr.DataArray(stokes, dims="stokes_out")).item() == np.pi / 2
+    assert aolp(get_backend().module.Array4f64(*stokes)).numpy()[0] == np.pi / 2

@@ -212,8 +212,7 @@ def dolp_aolp_from_stokes(stokes: ArrayLike) -> tuple[NDArray[np.float64], NDArr
     intensity, q, u = array[..., 0], array[..., 1], array[..., 2]
     linear = np.hypot(q, u)
     dolp = np.divide(linear, intensity, out=np.full_like(linear, np.nan), where=intensity != 0)
-    # Adding 0.0 turns −0.0 into 0.0, which keeps light along s at +π/2 and never at −π/2.
-    return dolp, 0.5 * np.arctan2(u + 0.0, q)
+    return dolp, within_half_turn(0.5 * np.arctan2(u, q), 0.5 * np.pi)
 
 
 def qu_from_dolp_aolp(

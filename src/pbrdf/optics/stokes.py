@@ -7,6 +7,7 @@ I = 0 there is no light and the result is NaN.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 __all__ = ["STOKES", "aolp", "docp", "dolp", "dop"]
@@ -34,15 +35,22 @@ def dop(stokes: Any) -> Any:
 
 
 def aolp(stokes: Any) -> Any:
-    """Angle of linear polarisation ½ atan2(U, Q) in radians, within (−π/2, π/2], from p towards s."""
+    """Angle of linear polarisation ½ atan2(U, Q) in radians, within (−π/2, π/2], from p towards s.
+
+    Light along s is at π/2 whatever the sign of a U that is zero or rounds to it.
+    """
     _, q, u, _ = _components(stokes)
+    right = 0.5 * math.pi
     if _is_drjit(stokes):
         import drjit as dr
 
-        return 0.5 * dr.atan2(u, q)
+        angle = 0.5 * dr.atan2(u, q)
+        return dr.select(angle <= -right, right, angle)
     import numpy as np
 
-    return 0.5 * np.arctan2(u, q)
+    angle = 0.5 * np.arctan2(u, q)
+    # -π/2 alone lies at or below the open end: the other end is the same direction
+    return angle + np.pi * (angle <= -right)
 
 
 def _is_drjit(value: Any) -> bool:

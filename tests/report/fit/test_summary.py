@@ -19,6 +19,7 @@ from pbrdf.report.fit.summary import (
     summary_text,
     verdict_in_words,
 )
+from pbrdf.report.numbers import brief
 
 
 def test_the_summary_names_everything(report):
@@ -148,6 +149,10 @@ def test_optima_in_words(report):
     assert "9 times the χ² (3 starts)" in optima_in_words(replace(result, optima=result.optima[::2]))[1]
     assert optima_in_words(replace(result, optima=[])) == ["none of 64 starts converged"]
     assert "no other optimum" in optima_in_words(replace(result, optima=result.optima[:1]))[1]
+    alone = replace(result, optima=result.optima[:1], starts=1, converged=1)
+    assert optima_in_words(alone) == [
+        f"the only start reached an optimum (χ² = {brief(result.optima[0].chi2)})"
+    ]
 
 
 def test_dark_geometries_are_blamed_for_a_large_rms(report):

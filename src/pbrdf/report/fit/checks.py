@@ -10,7 +10,7 @@ from pbrdf.inversion.conventions_check import contradicted_conventions, misfit
 from pbrdf.inversion.suggestions import suggestions
 from pbrdf.inversion.trials import Suggestion
 from pbrdf.inversion.verdict import Level
-from pbrdf.report.numbers import shown_unit
+from pbrdf.models.parameters import shown_unit
 
 if TYPE_CHECKING:
     import xarray as xr
