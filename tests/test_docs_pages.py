@@ -1,0 +1,64 @@
+"""Every page of documentation runs: its Python blocks, cells and commands, in order, in a folder of its own.
+
+What a page takes for granted is made by :mod:`docs_setup`; commands that cannot run here stand there with the reason.
+"""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+
+import pytest
+from typer.testing import CliRunner
+
+import docs_setup
+from docs_pages import PAGES, pieces, words
+from pbrdf.cli.main import app
+from pbrdf.models import MODELS
+
+
+@contextmanager
+def models_of_the_package():
+    """As a command finds them: a process of its own knows nothing of the models that a page's Python has registered."""
+    registered = dict(MODELS._classes)
+    for name in registered.keys() - KNOWN:
+        del MODELS._classes[name]
+    yield
+    MODELS._classes.clear()
+    MODELS._classes.update(registered)
+
+
+KNOWN = set(MODELS)
+RUNNING = [name for name, page in PAGES.items() if any(True for _ in pieces(page))]
+
+
+@pytest.mark.slow
+# a session leaves pictures open
+@pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning")
+@pytest.mark.parametrize("name", RUNNING)
+def test_the_page_runs(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setenv("COLUMNS", "100")
+    docs_setup.prepare(name)
+    namespace: dict = {"__name__": "page"}
+    for piece in pieces(PAGES[name]):
+        place = f"{PAGES[name]}:{piece.line}"
+        if piece.kind == "file":
+            file, _, text = piece.text.partition("\n")
+            (tmp_path / file).write_text(text, encoding="utf-8")
+        elif piece.kind == "python":
+            # the line numbers of an error are those of the page
+            exec(compile("\n" * (piece.line - 1) + piece.text, str(PAGES[name]), "exec"), namespace)
+        elif docs_setup.why_not(piece.text) is None:
+            with models_of_the_package():
+                result = CliRunner().invoke(app, docs_setup.small(name, words(piece.text)))
+            assert result.exit_code == piece.code, f"{place}: {piece.text}\n{result.output}"
+            if result.exception is not None and not isinstance(result.exception, SystemExit):
+                raise result.exception
+
+
+def test_every_exception_is_of_use():
+    """A command that no page shows any more is no exception."""
+    commands = [piece.text for page in PAGES.values() for piece in pieces(page) if piece.kind == "command"]
+    for pattern in docs_setup.NOT_RUN:
+        assert any(pattern in command for command in commands), pattern
