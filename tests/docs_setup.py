@@ -7,12 +7,14 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import xarray as xr
 from PIL import Image
 from typer.testing import CliRunner
 
 import pbrdf
 from docs_pages import PAGES, pieces
 from pbrdf.cli.main import app
+from pixel_helpers import blank, painted
 
 #: Commands that are not run, known by a part of them, and why.
 NOT_RUN = {
@@ -26,13 +28,16 @@ NOT_RUN = {
     ".xlsx": "a workbook, which tests/files/test_workbook.py writes and reads",
     "drr.toml": "frames of a Mueller polarimeter, which tests/cli/test_frame_cases.py reduces",
     "mueller-run-reduced": "what comes of them",
+    "stokes.exr --angles": "pictures of many geometries, which tests/rendering/test_picture_regions.py reduces",
+    "stokes-reduced": "what comes of them",
     "--scheduler tcp": "a Dask scheduler",
     "SLURM_ARRAY_TASK_ID": "SLURM",
 }
 
 #: Options that make a command small, by its name.
 _SMALL = {
-    "fit": ["--starts", "8"],
+    "fit": ["--starts", "4", "--no-figures", "--no-suggestions"],
+    "map": ["--starts", "4", "--no-figures"],
     "compare": ["--starts", "2", "--vary", "0", "--no-figures"],
     "measure": ["--patch", "4"],
     "reduce": ["--no-pictures"],
@@ -74,13 +79,18 @@ def _experiment(*names: str, paint: str = "matte-white-thick") -> None:
         pbrdf.write(pbrdf.open_experiment(paint), name)
 
 
-def _frames(folder: str, *, patch: int = 4, samples: str = "matte-white-thick") -> None:
+def _frames(folder: str, *, patch: int = 4) -> None:
     """A virtual measurement: frames in `folder`, and what describes them beside it."""
-    run("measure", *samples.split(), "--patch", str(patch), "--positions", "60", "-o", "virtual")
+    run("measure", "matte-white-thick", "--patch", str(patch), "--positions", "60", "-o", "virtual")
     Path("virtual/frames").rename(folder)
-    for there, here in (("polarimeter", "imager"), ("regions", "regions")):
-        Path(f"virtual/{there}.toml").rename(f"{here}.toml")
+    Path("virtual/polarimeter.toml").rename("imager.toml")
     Path("virtual/angles.csv").rename("angles.csv")
+    # without the dark border, which takes a map longer than the sample
+    for path in Path(folder).iterdir():
+        with Image.open(path) as picture:
+            sample = picture.crop((4, 4, 4 + patch, 4 + patch))
+        sample.save(path)
+    Path("regions.toml").write_text(f"[paint]\nrectangle = [0, {patch}, 0, {patch}]\n", encoding="utf-8")
 
 
 def run(*arguments: str) -> None:
@@ -95,14 +105,14 @@ def _readme() -> None:
 
 
 def _data_format() -> None:
-    rows = "".join(
-        f"{i},{r},0,{sample},{0.3 * sample / (1 + r)}\n"
+    rows = [
+        f"{i},{r},0,{sample},{level / (2 + r)}"
+        for sample, level in (("A", 0.3), ("B", 0.6))
         for i in (10, 50)
         for r in range(9)
-        for sample in (1, 2)
-    )
-    text = rows.replace(",1,", ",A,").replace(",2,", ",B,")
-    Path("paints.csv").write_text(f"# quantity: brdf\ntheta_i,theta_r,phi,sample,I\n{text}", encoding="utf-8")
+    ]
+    table = ["# quantity: brdf", "theta_i,theta_r,phi,sample,I", *rows]
+    Path("paints.csv").write_text("\n".join(table) + "\n", encoding="utf-8")
     wafer = ["; WAVELENGTH" + " 70.2 70.2" * 8]
     for wavelength, (a, b, c) in {522.8: (0.626, -0.036, 0.777), 550.3: (0.392, 0.063, 0.916)}.items():
         wafer.append(
@@ -139,12 +149,10 @@ def _identification() -> None:
     _experiment("enamel.csv", "field.csv")
     for table in ("labelled", "others"):
         Path(f"{table}.csv").write_text("file,material\nenamel.csv,enamel\n", encoding="utf-8")
-    image = pbrdf.open_experiment("white").expand_dims(y=2, x=2)
-    fixed = ("theta_i", "theta_r", "phi", "group", "wavelength")
-    image = image.assign_coords(
-        {name: image[name].isel(y=0, x=0) for name in fixed if "y" in image[name].dims}
+    image = xr.concat(
+        [pbrdf.open_experiment("white")] * 2, "x", coords="minimal", compat="override", join="override"
     )
-    pbrdf.write(image, "panel.nc")
+    image.expand_dims(y=1).to_netcdf("panel.nc", engine="h5netcdf")
     run("map", "panel.nc", "-o", "panel-map.zarr", "--no-figures")
 
 
@@ -191,6 +199,20 @@ def _own_model() -> None:
     _own_model_file()
 
 
+def _pixel_geometry() -> None:
+    geometry = pbrdf.parse_pixel_geometry("sphere:x=20,y=20,r=15,light=40@90,fov=20")
+    here = geometry.located(blank(41, 41)).pixels(np.arange(41), np.arange(41))
+    paint = pbrdf.DoubleGauss(sigma=0.15, n=1.6, a=0.4, k=1.2, b=0.2, t=0.6)
+    Path("run-reduced").mkdir()
+    pictures = painted(paint, here, noise=1e-4)
+    pictures.to_netcdf("run-reduced/stokes.nc", engine="h5netcdf")
+
+
+def _gallery() -> None:
+    _model("dark.json")
+    pbrdf.write(pbrdf.open_experiment("matte-white-thick").isel(geometry=range(0, 21, 3)), "seven.csv")
+
+
 def _real_data() -> None:
     text = "# theta_i theta_r phi I\n" + "".join(f"30 {r} 0 0.{r}\n" for r in range(10, 70, 10))
     Path("scan.dat").write_text(f"a goniometer\n# quantity: brdf\n{text}", encoding="utf-8")
@@ -200,8 +222,8 @@ def _reduction() -> None:
     rng = np.random.default_rng(0)
     Image.fromarray(rng.integers(40, 200, (40, 60), dtype=np.uint8)).save("picture.png")
     _frames("run", patch=32)
-    text = Path("regions.toml").read_text(encoding="utf-8").replace("matte-white-thick", "paint")
-    Path("regions.toml").write_text(text, encoding="utf-8")
+    _model("ball.json")
+    run("render", "ball.json", "--size", "40x40", "--spp", "16", "-o", "stokes.exr")
 
 
 _FILES: dict[str, Callable[[], None]] = {
@@ -217,5 +239,6 @@ _FILES: dict[str, Callable[[], None]] = {
     "real-data": _real_data,
     "reduction": _reduction,
     "scenes": lambda: _model("a.json", "b.json", "dark.json"),
-    "gallery": lambda: _model("dark.json"),
+    "gallery": _gallery,
+    "pixel-geometry": _pixel_geometry,
 }

@@ -228,9 +228,9 @@ def model_zoo(pictures: Path) -> str:
         "# Model zoo",
         "",
         f"The {len(MODELS)} models that are registered, each with the figure that `pbrdf plot MODEL.json "
-        f"--theta-i {THETA_I:g}` draws of it: intensity and degree of linear polarisation over the hemisphere, and both "
-        "in the plane of incidence. Where they come from and what each was checked against: [facets](../models.md), "
-        "[bodies](../models-bodies.md); numbers for programs: `pbrdf models --json`.",
+        f"--theta-i {THETA_I:g}` draws of it: intensity and degree of linear polarisation over the hemisphere, and "
+        "both in the plane of incidence. Where they come from and what each was checked against: "
+        "[facets](../models.md), [bodies](../models-bodies.md); numbers for programs: `pbrdf models --json`.",
         "",
     ]
     for name, model in MODELS.items():
