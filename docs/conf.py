@@ -11,7 +11,7 @@ HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE / "_ext"))
 # the tutorials run `pbrdf` as a reader would: the one beside this Python
 os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
-os.environ["COLUMNS"] = "100"
+os.environ["COLUMNS"] = "90"  # of a command's output: the width of a page
 
 from pbrdf.version import __version__  # noqa: E402
 

@@ -1,7 +1,8 @@
 """The pages of documentation as programs: their Python blocks, notebook cells and commands, in the order they stand in.
 
 Blocks of ``python`` and cells of a page share one namespace and one folder, as a reader's session would; a command is
-a line that begins with ``pbrdf`` (or, in a cell, ``!pbrdf``) in an indented or fenced block.
+a line that begins with ``pbrdf`` in an indented or fenced block, or in a cell ``%%sh``; with ``|| true`` it is one that
+is refused.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ PAGES = {
 
 
 class Piece(NamedTuple):
-    """What a page shows to be run: Python, or a command with its exit code; and the line it stands in."""
+    """What a page shows to be run: Python, a file, or a command with its exit code; and the line it stands in."""
 
     kind: str
     text: str
@@ -66,10 +67,12 @@ def _block(language: str, lines: list[str], start: int) -> Iterator[Piece]:
 
 
 def _cell(lines: list[str], start: int) -> Iterator[Piece]:
+    while not lines[0] or lines[0].startswith(":"):  # how the cell is shown
+        lines, start = lines[1:], start + 1
     if lines[0].startswith("%%writefile "):
         yield Piece("file", "\n".join([lines[0].split()[1], *lines[1:], ""]), start + 1)
-    elif lines[0].startswith("!"):
-        yield from _commands([line.removeprefix("!") for line in lines], start)
+    elif lines[0] == "%%sh":
+        yield from _commands(lines[1:], start + 1)
     else:
         yield Piece("python", "\n".join(lines), start + 1)
 
@@ -83,11 +86,9 @@ def _commands(lines: list[str], start: int) -> Iterator[Piece]:
             line = line[:-1] + lines[i].strip()
         i += 1
         if line.startswith("pbrdf "):
-            # a comment tells what a command does, and whether it is to fail
-            command, _, comment = line.partition(" #")
-            code = 2 if comment.strip() == "refused" else 3 if comment.strip() == "not converged" else 0
-            for part in re.split(r" && ", command.strip()):
-                yield Piece("command", part, first, code)
+            command, _, refused = line.partition(" #")[0].strip().partition(" || ")
+            for part in command.split(" && "):
+                yield Piece("command", part, first, 2 if refused else 0)
 
 
 def words(command: str) -> list[str]:

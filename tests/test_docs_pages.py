@@ -5,14 +5,17 @@ What a page takes for granted is made by :mod:`docs_setup`; commands that cannot
 
 from __future__ import annotations
 
+import importlib
+import re
 from contextlib import contextmanager
 
 import pytest
 from typer.testing import CliRunner
 
 import docs_setup
-from docs_pages import PAGES, pieces, words
-from pbrdf.cli.main import app
+import pbrdf
+from docs_pages import DOCS, PAGES, pieces, words
+from pbrdf.cli.main import COMMANDS, app
 from pbrdf.models import MODELS
 
 
@@ -83,3 +86,59 @@ def test_every_exception_is_of_use():
     commands = [piece.text for page in PAGES.values() for piece in pieces(page) if piece.kind == "command"]
     for pattern in docs_setup.NOT_RUN:
         assert any(pattern in command for command in commands), pattern
+
+
+def links(page):
+    """What the links and pictures of a page name, outside of code."""
+    prose = re.sub(
+        r"^```.*?^```|^    .*?$|`[^`\n]*`",
+        "",
+        page.read_text(encoding="utf-8"),
+        flags=re.DOTALL | re.MULTILINE,
+    )
+    return [
+        target for target in re.findall(r"\]\(([^()\s]+)\)", prose) if not target.startswith(("http", "#"))
+    ]
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_links_lead_to_files(name):
+    for target in links(PAGES[name]):
+        path = PAGES[name].parent / target.partition("#")[0]
+        # these are made when the manual is built
+        assert path.exists() or "docs/generated/" in path.as_posix(), target
+
+
+def test_every_page_has_its_place():
+    listed = set(re.findall(r"^[\w/-]+$", PAGES["index"].read_text(encoding="utf-8"), re.MULTILINE))
+    assert set(PAGES) - {"index", "README"} <= listed
+
+
+@pytest.fixture
+def generated(monkeypatch):
+    """The Sphinx extension, which needs no Sphinx to write most of its pages."""
+    monkeypatch.syspath_prepend(DOCS / "_ext")
+    return importlib.import_module("generated_pages")
+
+
+@pytest.mark.slow
+def test_every_command_is_described(generated):
+    page = generated.commands_page()
+    for command in COMMANDS:
+        assert f"\n## pbrdf {command}\n" in page
+    assert "\n### pbrdf library add\n" in page
+    assert "`--hold-out KIND=VALUES`\n: " in page
+    assert "FORMATS" not in page
+
+
+def test_every_public_name_has_its_group(generated):
+    names = [name for group in generated._groups().values() for name in group]
+    assert sorted(names) == sorted(name for name in pbrdf.__all__ if not name.startswith("__"))
+
+
+def test_every_model_is_shown(generated, tmp_path, monkeypatch):
+    drawn = []
+    monkeypatch.setattr(generated, "_draw", lambda model, name, target: drawn.append(name))
+    page = generated.model_zoo(tmp_path)
+    assert drawn == list(MODELS)
+    assert all(f"\n## {name}\n" in page for name in MODELS)
