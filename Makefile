@@ -23,8 +23,8 @@ quick: lint
 	$(PYTEST) -m 'not slow' $(PYTEST_ARGS)
 
 lint: $(TEST_STAMP)
-	$(BIN)/ruff check src tests benchmarks scripts docs
-	$(BIN)/ruff format --check src tests benchmarks scripts docs
+	$(BIN)/ruff check src tests benchmarks scripts docs/examples docs/_ext docs/conf.py
+	$(BIN)/ruff format --check src tests benchmarks scripts docs/examples docs/_ext docs/conf.py
 	$(BIN)/lint-imports --no-cache
 	$(BIN)/mypy
 
