@@ -30,7 +30,7 @@ lint: $(TEST_STAMP)
 
 # the manual as a site: docs/_build/html/index.html; the tutorials run, warnings are errors, nothing is fetched but packages
 docs: $(DOCS_STAMP)
-	$(BIN)/python -m sphinx -W --keep-going --quiet -b html -d docs/_build/doctrees docs docs/_build/html
+	$(BIN)/python -m sphinx -E -W --keep-going --quiet -b html -d docs/_build/doctrees docs docs/_build/html
 	@echo "Written: docs/_build/html/index.html"
 
 benchmark: $(TEST_STAMP)

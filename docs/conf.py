@@ -11,7 +11,8 @@ HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE / "_ext"))
 # the tutorials run `pbrdf` as a reader would: the one beside this Python
 os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
-os.environ["COLUMNS"] = "90"  # of a command's output: the width of a page
+# of a command's output: the width of a page, and no colours and progress bars, which the notebook's kernel would force
+os.environ.update(COLUMNS="90", NO_COLOR="1", TTY_COMPATIBLE="0")
 
 from pbrdf.version import __version__  # noqa: E402
 
@@ -28,7 +29,7 @@ highlight_language = "none"
 myst_enable_extensions = ["deflist"]
 myst_heading_anchors = 4
 
-nb_execution_mode = "cache"
+nb_execution_mode = "force"
 nb_execution_in_temp = True
 nb_execution_timeout = 300
 nb_execution_raise_on_error = True

@@ -37,6 +37,7 @@ NOT_RUN = {
 #: Options that make a command small, by its name.
 _SMALL = {
     "fit": ["--starts", "4", "--no-figures", "--no-suggestions"],
+    "identify": ["--no-next"],
     "map": ["--starts", "4", "--no-figures"],
     "compare": ["--starts", "2", "--vary", "0", "--no-figures"],
     "measure": ["--patch", "4"],
@@ -64,7 +65,7 @@ def prepare(page: str) -> None:
 
 
 def _fit(folder: str, paint: str = "matte-white-thick") -> None:
-    pbrdf.fit(pbrdf.open_experiment(paint), starts=4).save(folder)
+    run("fit", paint, "--starts", "4", "--no-figures", "-o", folder)
 
 
 def _model(*names: str) -> None:
