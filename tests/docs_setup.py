@@ -34,6 +34,9 @@ NOT_RUN = {
     "SLURM_ARRAY_TASK_ID": "SLURM",
 }
 
+#: Pages that are not run, and why.
+PAGES_NOT_RUN = {"explorer": "it serves a page until Ctrl-C, which tests/explorer does"}
+
 #: Options that make a command small, by its name.
 _SMALL = {
     "fit": ["--starts", "4", "--no-figures", "--no-suggestions"],

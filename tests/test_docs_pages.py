@@ -33,7 +33,11 @@ def models_of_the_package():
 KNOWN = set(MODELS)
 #: Commands of other pages, which the gallery names again.
 ELSEWHERE = {piece.text for name, page in PAGES.items() if name != "gallery" for piece in pieces(page)}
-RUNNING = [name for name, page in PAGES.items() if any(True for _ in pieces(page))]
+RUNNING = [
+    name
+    for name, page in PAGES.items()
+    if name not in docs_setup.PAGES_NOT_RUN and any(True for _ in pieces(page))
+]
 
 
 @pytest.mark.slow
