@@ -4,6 +4,7 @@ Nothing is fetched: fonts are the reader's own, no page needs a script from else
 """
 
 import os
+import shutil
 import sys
 from pathlib import Path
 
@@ -11,8 +12,12 @@ HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE / "_ext"))
 # the tutorials run `pbrdf` as a reader would: the one beside this Python
 os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
-# of a command's output: the width of a page, and no colours and progress bars, which the notebook's kernel would force
-os.environ.update(COLUMNS="90", NO_COLOR="1", TTY_COMPATIBLE="0")
+os.environ["COLUMNS"] = "90"  # of a command's output: the width of a page
+# what the kernel of a tutorial runs first
+os.environ["IPYTHONDIR"] = str(HERE / "_build" / "ipython")
+startup = HERE / "_build" / "ipython" / "profile_default" / "startup"
+startup.mkdir(parents=True, exist_ok=True)
+shutil.copy(HERE / "_ext" / "sh_cells.py", startup)
 
 from pbrdf.version import __version__  # noqa: E402
 
