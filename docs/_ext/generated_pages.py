@@ -255,7 +255,7 @@ def model_zoo(pictures: Path) -> str:
 def _about(model: Any) -> str:
     """The docstring of a class, as far as it is prose."""
     text = inspect.cleandoc(model.__doc__ or "")
-    text = re.split(r"\n\n(?=Parameters\n-|\.\. )", text)[0]
+    text = re.split(r"\n\n(?=Every parameter may|Parameters\n-|\.\. )", text)[0]
     return re.sub(r":\w+:`~?([^`]*)`", r"`\1`", text).replace("``", "`")
 
 
