@@ -98,4 +98,4 @@ def confusion_figure(table: Confusion, title: str) -> Figure:
 
 def _short(count: int) -> str:
     """A count that fits in a cell."""
-    return str(count) if count < 10_000 else f"{count / 1000:.0f}k"
+    return str(count) if count < 10_000 else f"{count / 1000:.0f} 000"
