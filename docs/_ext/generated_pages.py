@@ -206,6 +206,8 @@ def _directive(name: str) -> list[str]:
         return [f".. autoclass:: pbrdf.{name}", "   :members:"]
     if callable(value):
         return [f".. autofunction:: pbrdf.{name}"]
+    if inspect.ismodule(value):
+        return [f".. automodule:: {value.__name__}", "   :members:"]
     from sphinx.pycode import ModuleAnalyzer
 
     comments = ModuleAnalyzer.for_module(pbrdf._HOME[name]).find_attr_docs()
