@@ -85,9 +85,9 @@ def render(
 ) -> None:
     """Render painted objects as a polarisation camera sees them: S0 … S3, DoLP and AoLP.
 
-    A sphere under a clear sky: `pbrdf render white`
+    A sphere under a clear sky: `pbrdf render white-scene`
 
-    Two paints, seen through a polariser: `pbrdf render white pearl-white --scene plate --polarizer 90`
+    Two paints, seen through a polariser: `pbrdf render white-scene pearl-white-scene --scene plate --polarizer 90`
     """
     from pbrdf.cli.sources import open_model
     from pbrdf.files.atomic import require_writable_folder
@@ -173,15 +173,24 @@ def _warn_of_gain(source: str, model: Model) -> None:
     """Say so if a paint gives off more light than it gets: its amplitude is on a camera's scale, not on a BRDF's."""
     import numpy as np
 
+    from pbrdf.cli.sources import is_paint
     from pbrdf.models.reflectance import directional_hemispherical_reflectance
 
     if any(np.ndim(value) for value in model.values.values()):
         return
     reflectance = float(directional_hemispherical_reflectance(model, math.radians(30.0)))
     if reflectance > 1.0:
+        from pbrdf.data.paints import SCENE_PAINTS
+
+        companion = f"{source}-scene"
         warn(
             f"{source} reflects {reflectance:.2f} of the light it gets: its amplitude a is on the scale of the camera "
-            "that measured it; compare no brightness with other things in the scene"
+            "that measured it; "
+            + (
+                f"{companion} is the same paint on the scale of a scene"
+                if is_paint(source) and companion in SCENE_PAINTS
+                else "compare no brightness with other things in the scene"
+            )
         )
 
 
