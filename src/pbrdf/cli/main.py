@@ -53,6 +53,7 @@ COMMANDS = {
     "export": "export",
     "check": "check",
     "convert": "convert",
+    "example": "example",
     "paints": "lists",
     "models": "lists",
     "doctor": "doctor",
