@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from pbrdf.data import check, make_dataset, read, validate, write
     from pbrdf.data.paints import PAINTS, load_paint, open_experiment
     from pbrdf.data.readers import register_reader
+    from pbrdf.explorer.explore import explore
     from pbrdf.identification.class_map import identify_map
     from pbrdf.identification.identify import identify
     from pbrdf.identification.labelled import calibrate_library
@@ -138,6 +139,8 @@ _HOME = {
     "error_analysis": "pbrdf.inversion",
     "plausibility": "pbrdf.inversion",
     "directional_hemispherical_reflectance": "pbrdf.models.reflectance",
+    # all of it in a browser or a notebook
+    "explore": "pbrdf.explorer.explore",
     # which material it is
     "identify": "pbrdf.identification.identify",
     "identify_map": "pbrdf.identification.class_map",
@@ -227,6 +230,7 @@ __all__ = [
     "dolp",
     "dop",
     "error_analysis",
+    "explore",
     "fit",
     "fit_map",
     "get_backend",

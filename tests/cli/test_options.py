@@ -25,7 +25,7 @@ def test_shared_options_have_the_same_short_form():
 
 
 def test_options_that_mean_the_same_are_described_alike():
-    for option, count in (("--backend", 9), ("--dark-level", 2), ("--calibration-error", 2), ("--patch", 2)):
+    for option, count in (("--backend", 10), ("--dark-level", 2), ("--calibration-error", 2), ("--patch", 2)):
         found = declared(option).values()
         assert len(found) == count, option
         assert len({(p.help, p.metavar) for p in found}) == 1, option

@@ -341,6 +341,37 @@ def test_read_from_a_store_block_by_block(tmp_path, monkeypatch):
     assert np.array_equal(found["material"], identify_map(ds, LIBRARY)["material"])
 
 
+def test_no_more_than_a_block_is_read_at_a_time(monkeypatch):
+    """Numbers that are read, by block, of data that are not in memory: none more than once."""
+    from xarray.backends import BackendArray
+    from xarray.core import indexing
+
+    ds, _ = cube((6, 12))
+    read = []
+
+    class Counted(BackendArray):
+        def __init__(self, values):
+            self.values, self.shape, self.dtype = values, values.shape, values.dtype
+
+        def __getitem__(self, key):
+            def get(inner):
+                read.append(self.values[inner].size)
+                return self.values[inner]
+
+            return indexing.explicit_indexing_adapter(key, self.shape, indexing.IndexingSupport.BASIC, get)
+
+    lazy = ds.copy()
+    for name in ds.data_vars:
+        array = indexing.LazilyIndexedArray(Counted(ds[name].values))
+        lazy[name] = xr.Variable(ds[name].dims, array, ds[name].attrs)
+    monkeypatch.setattr(class_map, "PIXELS", 24)
+    found = identify_map(lazy, LIBRARY)
+    monkeypatch.undo()
+    assert max(read) == 24 * 9
+    assert sum(read) == sum(ds[name].size for name in ds.data_vars)
+    assert np.array_equal(found["material"], identify_map(ds, LIBRARY)["material"])
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["parameters", "stokes", "gain"])
 def test_coverage_of_the_sets(kind):

@@ -17,6 +17,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType
+from typing import NoReturn
 
 from pbrdf.cli.console import fail
 
@@ -68,12 +69,12 @@ def heard_at_once() -> Iterator[threading.Event]:
         sender.close()
 
 
-def end() -> None:
-    """Leave at once: the end of Python would wait for kernels that are still at work."""
+def end(code: int = INTERRUPTED) -> NoReturn:
+    """Leave at once with an exit code: the end of Python would wait for kernels that are still at work."""
     for stream in (sys.stdout, sys.stderr):
         with suppress(OSError):
             stream.flush()
-    os._exit(INTERRUPTED)
+    os._exit(code)
 
 
 def _watch(receiver: socket.socket, heard: threading.Event) -> None:

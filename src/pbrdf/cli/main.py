@@ -44,6 +44,7 @@ COMMANDS = {
     "polarimeter": "polarimeter",
     "reduce": "reduce",
     "plot": "plot",
+    "explore": "explore",
     "plan": "plan",
     "identify": "identify",
     "library": "library",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,7 +12,7 @@ import typer
 from pbrdf.cli.options import output_option, with_reading_options
 from pbrdf.cli.reading import Reading
 from pbrdf.cli.sources import is_paint
-from pbrdf.cli.values import require_folder_of
+from pbrdf.cli.values import require_folder_of, stokes_vector
 from pbrdf.errors import PbrdfError
 
 if TYPE_CHECKING:
@@ -57,6 +58,14 @@ def plot(
             show_default="35 for a model, else as measured",
         ),
     ] = None,
+    incident: Annotated[
+        str | None,
+        typer.Option(
+            help="Stokes vector of the light of models, I,Q,U,V; of data as measured.",
+            metavar="STOKES",
+            show_default="natural",
+        ),
+    ] = None,
     output: Annotated[
         Path | None,
         output_option("The figure: .png, .pdf or .svg.", show_default="<name>.png"),
@@ -82,11 +91,16 @@ def plot(
         raise PbrdfError(f"{are}: --{option} is for files of data")
     if theta_i is not None and not 0.0 <= theta_i < 90.0:
         raise PbrdfError(f"--theta-i {theta_i:g}: the angle must be at least 0° and below 90°")
+    light = None if incident is None else stokes_vector(incident, "--incident")
+    if light is not None and (kind is Kind.MUELLER or (kind is None and len(sources) == 1)):
+        raise PbrdfError("--incident is for --kind curves, hemisphere and surface")
     leave_out_help_texts()
     if kind is None and len(sources) == 1:
         figure = _overview(sources[0], reading, theta_i)
     else:
-        figure = _together([_opened(source, reading) for source in sources], kind or Kind.CURVES, theta_i)
+        figure = _together(
+            [_opened(source, reading) for source in sources], kind or Kind.CURVES, theta_i, light
+        )
     save_figure(figure, target)
     print(target)
 
@@ -114,17 +128,20 @@ def _overview(source: str, reading: Reading, theta_i: float | None) -> Figure:
     return data_figure(reading.open(source), Path(source).name)
 
 
-def _together(sources: list[Source], kind: Kind, theta_i: float | None) -> Figure:
+def _together(
+    sources: list[Source], kind: Kind, theta_i: float | None, light: Sequence[float] | None
+) -> Figure:
     from pbrdf.report.together.curves import curves_figure, mueller_figure
     from pbrdf.report.together.hemispheres import hemispheres_figure, surfaces_figure
 
+    if kind is Kind.MUELLER:
+        return mueller_figure(sources, theta_i)
     draw = {
         Kind.CURVES: curves_figure,
         Kind.HEMISPHERE: hemispheres_figure,
         Kind.SURFACE: surfaces_figure,
-        Kind.MUELLER: mueller_figure,
     }[kind]
-    return draw(sources, theta_i)
+    return draw(sources, theta_i, light)
 
 
 def _opened(source: str, reading: Reading) -> Source:

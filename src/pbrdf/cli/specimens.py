@@ -155,16 +155,18 @@ def open_pixels(source: str) -> xr.Dataset | None:
 
 
 def _in_radians(stored: xr.Dataset) -> xr.Dataset:
-    """Angles of a file, which are in degrees there, as the schema has them."""
+    """Angles of a file, which are in degrees there, as the schema has them; those of each pixel are not read yet."""
     import numpy as np
+    from xarray.conventions import decode_cf_variable
 
     from pbrdf.data.schema import ANGLES
 
-    turned = {
-        name: stored[name].copy(data=np.deg2rad(stored[name].values)).assign_attrs(units="rad")
-        for name in ANGLES
-        if name in stored and str(stored[name].attrs.get("units", "rad")).startswith("deg")
-    }
+    turned = {}
+    for name in ANGLES:
+        if name in stored and str(stored[name].attrs.get("units", "rad")).startswith("deg"):
+            variable = stored[name].variable.copy(deep=False)
+            variable.attrs = variable.attrs | {"units": "rad", "scale_factor": np.float64(np.pi / 180.0)}
+            turned[name] = decode_cf_variable(name, variable, decode_times=False)
     return stored.assign(turned)
 
 

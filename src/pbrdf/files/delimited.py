@@ -15,11 +15,13 @@ from __future__ import annotations
 import contextlib
 import csv
 import functools
+import io
 import math
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import IO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,7 +43,7 @@ from pbrdf.files.numbers import to_number
 from pbrdf.files.text import first_bytes, read_bytes, utf8
 from pbrdf.files.workbook import is_workbook, sheet_texts
 
-__all__ = ["TABLE_EXTENSIONS", "Row", "Table", "column_names", "read_table", "write_table"]
+__all__ = ["TABLE_EXTENSIONS", "Row", "Table", "column_names", "read_table", "table_text", "write_table"]
 
 #: Of files that tables are read from, those of workbooks last.
 TABLE_EXTENSIONS = (".csv", ".tsv", ".txt", ".dat", ".xlsx", ".xlsm", ".xlsb", ".xls", ".ods", ".mat")
@@ -463,10 +465,25 @@ def write_table(
         If the file cannot be written.
     """
     with atomic_file(path) as target, target.open("x", encoding="utf-8", newline="") as file:
-        for key, value in (statements or {}).items():
-            file.write(f"# {key}: {value}\n")
-        plain = csv.writer(file, lineterminator="\n")
-        quoted = csv.writer(file, lineterminator="\n", quoting=csv.QUOTE_ALL)
-        for cells in map(list, (names, *rows)):
-            # A row that began with the mark of a comment would be read as one.
-            (quoted if cells and comment_of(str(cells[0]), ",") is not None else plain).writerow(cells)
+        _write_rows(file, names, rows, statements or {})
+
+
+def table_text(
+    names: Iterable[str], rows: Iterable[Iterable[object]], statements: Mapping[str, str] | None = None
+) -> str:
+    """What :func:`write_table` writes."""
+    file = io.StringIO(newline="")
+    _write_rows(file, names, rows, statements or {})
+    return file.getvalue()
+
+
+def _write_rows(
+    file: IO[str], names: Iterable[str], rows: Iterable[Iterable[object]], statements: Mapping[str, str]
+) -> None:
+    for key, value in statements.items():
+        file.write(f"# {key}: {value}\n")
+    plain = csv.writer(file, lineterminator="\n")
+    quoted = csv.writer(file, lineterminator="\n", quoting=csv.QUOTE_ALL)
+    for cells in map(list, (names, *rows)):
+        # A row that began with the mark of a comment would be read as one.
+        (quoted if cells and comment_of(str(cells[0]), ",") is not None else plain).writerow(cells)

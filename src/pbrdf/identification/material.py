@@ -101,11 +101,15 @@ class Material:
         return self.space.build(self.space.to_parameters(self.mean))
 
     @property
-    def form(self) -> tuple[Any, ...]:
-        """What materials share that one kernel computes."""
+    def kernel(self) -> tuple[Any, ...]:
+        """What materials share whose light one kernel computes."""
         s = self.space
-        box = tuple(s.lower), tuple(s.upper)
-        return s.model, tuple(sorted(s.options.items())), s.free, tuple(sorted(s.fixed.items())), box
+        return s.model, tuple(sorted(s.options.items())), s.free, tuple(sorted(s.fixed.items()))
+
+    @property
+    def form(self) -> tuple[Any, ...]:
+        """The same, and the bounds: what materials share that one solver's kernel follows."""
+        return *self.kernel, (tuple(self.space.lower), tuple(self.space.upper))
 
     def draw(self, count: int, rng: np.random.Generator) -> np.ndarray:
         """Parameters of random specimens, shape (count, P), in the order of the free parameters."""

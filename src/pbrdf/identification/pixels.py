@@ -167,22 +167,21 @@ def of_stokes(
             stack = stack.take(known)
         channels = stack.channels
         if plain and stack.whitening is None and stack.theta_i.shape[1] == 1:
-            values, std = (array.transpose(2, 0, 1) for array in (stack.values, stack.std))
             if channels not in tables:
                 like = Observations(
                     theta_i=stack.theta_i[:, 0],
                     theta_r=stack.theta_r[:, 0],
                     phi=stack.phi[:, 0],
                     channels=channels,
-                    values=values[0],
-                    std=std[0],
+                    values=stack.values[..., 0],
+                    std=stack.std[..., 0],
                     illumination=stack.illumination,
                     std_known=True,
                 )
                 tables[channels] = SharedGeometry.of(
                     materials, like, gain=gain, least=least, temperature=temperature
                 )
-            return known, *tables[channels].evidence(values, std)
+            return known, *tables[channels].evidence(stack.values, stack.std)
         found = evidence(materials, stack, gain=gain)
         return known, found.log_evidence, found.distance, found.degrees_of_freedom
 

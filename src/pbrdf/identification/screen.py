@@ -28,10 +28,13 @@ DATA, SPECIMENS = 36, 1024
 WIDER = 1.5
 #: A datum is looked at that so many of the pixels have.
 PART = 0.7
-#: Pixels share errors R whose logarithms to base 2 are that near each other; R is above those of so many of them.
-NEAR, ABOVE = 0.5, 0.995
+#: Pixels share errors R whose logarithms to base 2 are that near each other; R is above those of so many of them, as
+#: so many show.
+NEAR, ABOVE, SHOWN = 0.5, 0.995, 2048
 #: By how much more the data scatter where they are divided by their mean intensity.
 NORMALISED = 1.5
+#: Pixels that are looked at together: what is made of them stays in a processor's cache.
+TOGETHER = 512
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,58 +69,69 @@ class Screen:
             own = emulator.material
             z[:, : len(own.mean)] = random.standard_normal((SPECIMENS, len(own.mean)))
             unknowns = own.mean + z[:, : len(own.mean)] @ own.root.T
-            signals.append(emulator.values(np.clip(unknowns, *own.space.box)).reshape(SPECIMENS, -1))
-        geometries = emulators[0].error.shape[1]
+            signals.append(emulator.values(np.clip(unknowns, *own.space.box)))
+        geometries = emulators[0].table.shape[2] // len(channels)
         intensities = np.repeat([not is_ratio(channel) for channel in channels], geometries)
         return cls(np.array(signals), specimens, intensities, gain)
 
-    def distance(self, values: np.ndarray, std: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def distance(self, values: np.ndarray, std: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Lower bounds of the squared distances of N pixels from C materials, and rough estimates of the specimens.
 
         Parameters
         ----------
         values, std
-            Shape (N, D), infinite ``std`` where nothing was measured.
+            Shape (D, N), infinite ``std`` where nothing was measured.
 
         Returns
         -------
-        distance, specimen
-            Shapes (N, C) and (N, C, P): 0 where a pixel lacks some of the data.
+        distance, specimen, seen
+            Shapes (C, N), (C, P, N) and (N,): 0 and False where a pixel lacks some of the data.
         """
-        bound = np.zeros((len(values), len(self.signals)))
-        specimen = np.zeros((*bound.shape, self.specimens.shape[2]), dtype=np.float32)
-        measured = np.isfinite(std)
-        usable = np.flatnonzero(measured.mean(axis=0) >= PART)
+        kinds, _, size = self.specimens.shape
+        bound = np.zeros((kinds, values.shape[1]), dtype=np.float32)
+        specimen = np.zeros((kinds, size, values.shape[1]), dtype=np.float32)
+        seen = np.zeros(values.shape[1], dtype=bool)
+        usable = np.flatnonzero(np.isfinite(std).mean(axis=1) >= PART)
         if not usable.size:
-            return bound, specimen
+            return bound, specimen, seen
         chosen = usable[np.unique(np.linspace(0, len(usable) - 1, DATA).astype(int))]
-        y, error = values[:, chosen], std[:, chosen]
+        y, error = values[chosen], std[chosen]
         signals = self.signals[:, :, chosen]
-        whole = np.flatnonzero(measured[:, chosen].all(axis=1))
+        seen = np.isfinite(error).all(axis=0)
         if self.gain:
             own = self.intensities[chosen]
             first = own & (np.arange(len(chosen)) < np.searchsorted(chosen, self._first))
             first = first if first.any() else own
-            size = y[:, first].mean(axis=1)
-            whole = whole[size[whole] > 0.0]
-            factor = np.where(own, np.where(size > 0.0, size, 1.0)[:, None], 1.0)
+            mean_size = y[first].mean(axis=0)
+            seen &= mean_size > 0.0
+            factor = np.where(own[:, None], np.where(mean_size > 0.0, mean_size, 1.0), 1.0)
             y, error = y / factor, NORMALISED * error / factor
             signals = np.where(own, signals / signals[:, :, first].mean(axis=2, keepdims=True), signals)
         mean = signals.mean(axis=1)
+        centre = mean.mean(axis=0)
         apart = signals - mean[:, None]
         covariance = WIDER * np.swapaxes(apart, 1, 2) @ apart / SPECIMENS
         along = np.swapaxes(apart, 1, 2) @ self.specimens / SPECIMENS
-        level = np.rint(np.log2(np.median(error[whole], axis=1)) / NEAR).astype(int)
+        whole = np.flatnonzero(seen)
+        level = np.rint(np.log2(error[:, whole].astype(np.float32)).mean(axis=0) / NEAR).astype(int)
         for number in np.unique(level):
-            rows = whole[level == number]
-            shared = np.quantile(error[rows], ABOVE, axis=0)
-            larger = np.maximum((error[rows] / shared).max(axis=1), 1.0)
-            for c in range(len(signals)):
-                inverse = np.linalg.inv(np.linalg.cholesky(covariance[c] + np.diag(shared**2)))
-                white = (y[rows] - mean[c]) @ inverse.T
-                specimen[rows, c] = np.clip(white @ (inverse @ along[c]), -REACH, REACH)
-                bound[rows, c] = np.einsum("nd,nd->n", white, white) / larger**2
-        return bound, specimen
+            columns = whole[level == number]
+            shared = np.quantile(error[:, columns[:: -(-len(columns) // SHOWN)]], ABOVE, axis=1)
+            root = np.linalg.inv(np.linalg.cholesky(covariance + np.diag(shared**2)))
+            guess = np.swapaxes(along, 1, 2) @ np.swapaxes(root, 1, 2) @ root
+            whiten = (root * shared).reshape(-1, len(chosen)).astype(np.float32)
+            estimate = (guess * shared).reshape(-1, len(chosen)).astype(np.float32)
+            offset = np.einsum("cij,cj->ci", root, mean - centre).reshape(-1, 1).astype(np.float32)
+            shift = np.einsum("cij,cj->ci", guess, mean - centre).reshape(-1, 1).astype(np.float32)
+            for begin in range(0, len(columns), TOGETHER):
+                at = columns[begin : begin + TOGETHER]
+                larger = np.maximum((error[:, at] / shared[:, None]).max(axis=0), 1.0)
+                apart_by = ((y[:, at] - centre[:, None]) / shared[:, None]).astype(np.float32)
+                white = (whiten @ apart_by - offset).reshape(kinds, len(chosen), -1)
+                bound[:, at] = np.einsum("cdn,cdn->cn", white, white) / larger**2
+                found = (estimate @ apart_by - shift).reshape(kinds, size, -1)
+                specimen[:, :, at] = np.clip(found, -REACH, REACH)
+        return bound, specimen, seen
 
     @property
     def _first(self) -> int:

@@ -28,6 +28,7 @@ __all__ = [
     "GREY",
     "RED",
     "Look",
+    "figure_bytes",
     "leave_out_help_texts",
     "looks_of",
     "new_figure",
@@ -180,11 +181,18 @@ def save_figure(figure: Figure, path: Path) -> None:
     kind = path.suffix.lower().removeprefix(".")
     if kind not in FIGURE_FORMATS:
         raise DataError(f"{path}: figures are written as {', '.join('.' + k for k in FIGURE_FORMATS)}")
-    with styled(), atomic_file(path) as target:
+    with atomic_file(path) as target:
+        target.write_bytes(figure_bytes(figure, kind))
+
+
+def figure_bytes(figure: Figure, kind: str) -> bytes:
+    """A figure as a file of one of :data:`FIGURE_FORMATS`; the same input gives the same bytes."""
+    with styled():
         if kind == "png":
-            target.write_bytes(png(_pixels(figure)))
-        else:
-            figure.savefig(target, format=kind, **FIGURE_FORMATS[kind])
+            return png(_pixels(figure))
+        file = io.BytesIO()
+        figure.savefig(file, format=kind, **FIGURE_FORMATS[kind])
+        return file.getvalue()
 
 
 def _pixels(figure: Figure) -> np.ndarray:

@@ -36,6 +36,25 @@ def test_models_alone_are_drawn_at_35_degrees_or_as_asked():
             np.testing.assert_allclose(ratio.get_ydata(), expected[:, 1] / expected[:, 0])
 
 
+def test_models_are_drawn_in_the_light_that_is_asked_for():
+    light = (1.0, 0.0, 0.6, 0.0)
+    figure = curves_figure([Source("a", PAINT)], 40.0, light)
+    assert figure.get_suptitle() == "a, light 1, 0, 0.6, 0"
+    assert [ax.get_ylabel() for ax in figure.axes] == ["intensity (1/sr)", "Q/I", "U/I", "V/I", "DoLP"]
+    (curve,) = lines(figure.axes[2], "a")
+    x = np.deg2rad(curve.get_xdata())
+    S = PAINT.stokes(np.deg2rad(40.0), np.abs(x), np.where(x < 0.0, np.pi, 0.0), incident=light)
+    np.testing.assert_allclose(curve.get_ydata(), S[:, 2] / S[:, 0])
+    with pytest.raises(ModelError, match="not the Stokes vector"):
+        curves_figure([Source("a", PAINT)], 40.0, (1.0, 2.0, 0.0, 0.0))
+
+
+@pytest.mark.slow
+def test_data_have_a_light_of_their_own(fitted):
+    with pytest.raises(DataError, match="was measured under light"):
+        curves_figure([fitted], None, (1.0, 1.0, 0.0, 0.0))
+
+
 def test_two_models_differ_in_more_than_colour():
     figure = curves_figure([Source("a", PAINT), Source("b", OTHER)])
     first, second = (lines(figure.axes[0], name)[0] for name in "ab")

@@ -95,6 +95,8 @@ def in_plane_cuts(points: Points) -> list[Cut]:
     constants["mirror"] = s - points.theta_i
     choices = {kind: _split(points.group, constants[kind], rows) for kind in KINDS}
     kind = min(choices, key=lambda k: len(choices[k]))
+    if rows.size < _FEWEST_POINTS * len(choices[kind]):  # then there are fewer directions, too
+        return []
     x = points.theta_i if kind in ("theta_r", "mirror") else s
     cuts, directions = [], 0
     for members in choices[kind]:
@@ -112,9 +114,10 @@ def in_plane_cuts(points: Points) -> list[Cut]:
 
 def _split(group: np.ndarray, constant: np.ndarray, rows: np.ndarray) -> list[np.ndarray]:
     """Rows of one group whose constant is the same within the gap; groups in the order of the file."""
+    _, first, code = np.unique(group[rows], return_index=True, return_inverse=True)
+    by_group = np.split(rows[np.argsort(code, kind="stable")], np.cumsum(np.bincount(code))[:-1])
     parts = []
-    for label in dict.fromkeys(group[rows]):
-        members = rows[group[rows] == label]
+    for members in (by_group[k] for k in np.argsort(first)):
         ordered = members[np.argsort(constant[members], kind="stable")]
         breaks = np.flatnonzero(np.diff(constant[ordered]) > _ANGLE_GAP) + 1
         parts += np.split(ordered, breaks)

@@ -11,7 +11,7 @@ from pbrdf.errors import DataError
 from pbrdf.report.dataset.panels import VIEWING_ANGLE, scale_intensity, scale_signed
 from pbrdf.report.dataset.quantities import is_intensity, quantity_label
 from pbrdf.report.style import Look, looks_of, panels, styled
-from pbrdf.report.together.source import Plane, Source, light_of, measured_names, planes_of
+from pbrdf.report.together.source import Plane, Source, light_note, light_of, measured_names, planes_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,7 +27,9 @@ _SMALL, _ELEMENT_SIZE = (2.9, 2.1), (2.1, 1.7)
 _LINES: tuple[Literal["-", "--", "-.", ":"], ...] = ("-", "--", "-.", ":")
 
 
-def curves_figure(sources: Sequence[Source], theta_i: float | None = None) -> Figure:
+def curves_figure(
+    sources: Sequence[Source], theta_i: float | None = None, incident: Sequence[float] | None = None
+) -> Figure:
     """Intensity and polarisation in the plane of incidence: a column for each cut, a colour for each source.
 
     Points are measured, lines are models; a fit has both.
@@ -38,16 +40,21 @@ def curves_figure(sources: Sequence[Source], theta_i: float | None = None) -> Fi
         What to draw.
     theta_i
         Angle of incidence in degrees; None for all (up to four) that were measured, and 35° without data.
+    incident
+        Stokes vector of the light; None for that of the data, natural light without data.
 
     Raises
     ------
     DataError
         If data lie on no few lines in the plane of incidence, or under different light.
+    ModelError
+        If ``incident`` is the Stokes vector of no light.
     """
     planes, found = planes_of(sources, theta_i, _MOST_PLANES)
-    names, light = measured_names(sources), light_of(sources)
+    light = light_of(sources, incident)
+    names = measured_names(sources, light)
     looks = looks_of(len(sources))
-    title = ", ".join(source.name for source in sources)
+    title = ", ".join(source.name for source in sources) + light_note(light)
     if len(planes) < found:
         title += f" ({len(planes)} of {found} cuts)"
     with styled():

@@ -13,7 +13,7 @@ from pbrdf.errors import DataError
 from pbrdf.report.dataset.panels import LOGARITHMIC_FROM, dress_hemisphere
 from pbrdf.report.polar_surface import draw_directions, draw_polar_surface, polar_surface
 from pbrdf.report.style import RED, new_figure, styled
-from pbrdf.report.together.source import Source, incidence_of, light_of
+from pbrdf.report.together.source import Source, incidence_of, light_note, light_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -43,7 +43,9 @@ class _View:
     values: dict[str, np.ndarray]
 
 
-def hemispheres_figure(sources: Sequence[Source], theta_i: float | None = None) -> Figure:
+def hemispheres_figure(
+    sources: Sequence[Source], theta_i: float | None = None, incident: Sequence[float] | None = None
+) -> Figure:
     """Intensity and DoLP over the hemisphere of viewing directions: a column for each source, one scale of colours.
 
     Parameters
@@ -53,14 +55,19 @@ def hemispheres_figure(sources: Sequence[Source], theta_i: float | None = None) 
     theta_i
         Angle of incidence in degrees, of data the nearest that was measured; None for the one with the most points,
         and 35° without data.
+    incident
+        Stokes vector of the light; None for that of the data, natural light without data.
 
     Raises
     ------
     DataError
         If the data were measured under different light, or hold neither intensity nor DoLP.
+    ModelError
+        If ``incident`` is the Stokes vector of no light.
     """
     angle = incidence_of(sources, theta_i)
-    views = _views(sources, angle, fine=True)
+    light = light_of(sources, incident)
+    views = _views(sources, angle, light, fine=True)
     names = _names(views)
     with styled():
         figure = new_figure(3.1 * max(len(views), 2) + 1.0, 3.3 * len(names) + 0.7)
@@ -101,18 +108,21 @@ def hemispheres_figure(sources: Sequence[Source], theta_i: float | None = None) 
                     ax.tick_params(axis="y", labelcolor="white")
             if drawn is not None:
                 figure.colorbar(drawn, ax=list(row), label=_LABELS[name], shrink=0.8, aspect=14.0)
-        figure.suptitle(f"θi = {angle:g}° (★ source)", fontsize=11.0)
+        figure.suptitle(f"θi = {angle:g}°{light_note(light)} (★ source)", fontsize=11.0)
         return figure
 
 
-def surfaces_figure(sources: Sequence[Source], theta_i: float | None = None) -> Figure:
+def surfaces_figure(
+    sources: Sequence[Source], theta_i: float | None = None, incident: Sequence[float] | None = None
+) -> Figure:
     """Intensity and DoLP as polar surfaces: a column for each source, each row with one scale; parameters as above.
 
     Measured values are points at their distance from the origin. Intensities that span decades are drawn by their
     logarithm.
     """
     angle = incidence_of(sources, theta_i)
-    views = _views(sources, angle, fine=False)
+    light = light_of(sources, incident)
+    views = _views(sources, angle, light, fine=False)
     names = _names(views)
     with styled():
         figure = new_figure(5.0 * len(views), 3.9 * len(names) + 0.5)
@@ -133,12 +143,14 @@ def surfaces_figure(sources: Sequence[Source], theta_i: float | None = None) -> 
                     draw_directions(ax, angle)
                 else:
                     draw_polar_surface(ax, view.theta_r, view.phi, r, angle)
-        figure.suptitle(f"θi = {angle:g}°: the distance from the origin is the value", fontsize=11.0)
+        figure.suptitle(
+            f"θi = {angle:g}°{light_note(light)}: the distance from the origin is the value", fontsize=11.0
+        )
         return figure
 
 
-def _views(sources: Sequence[Source], angle: float, *, fine: bool) -> list[_View]:
-    light, views = light_of(sources), []
+def _views(sources: Sequence[Source], angle: float, light: Sequence[float], *, fine: bool) -> list[_View]:
+    views = []
     for source in sources:
         both = source.model is not None and source.dataset is not None
         if (points := source.points) is not None:

@@ -10,6 +10,7 @@ import numpy as np
 
 from pbrdf.data.schema import NATURAL_LIGHT
 from pbrdf.errors import DataError, ModelError
+from pbrdf.models.evaluation import check_incident
 from pbrdf.optics.stokes import STOKES, dolp
 from pbrdf.report.dataset.cuts import Cut, in_plane_cuts
 from pbrdf.report.dataset.points import Points
@@ -25,6 +26,7 @@ __all__ = [
     "Plane",
     "Source",
     "incidence_of",
+    "light_note",
     "light_of",
     "measured_names",
     "planes_of",
@@ -212,8 +214,10 @@ def incidence_of(sources: Sequence[Source], theta_i: float | None) -> float:
     return float(full[np.abs(full - np.median(measured[0])).argmin()])
 
 
-def measured_names(sources: Sequence[Source]) -> list[str]:
+def measured_names(sources: Sequence[Source], light: Sequence[float]) -> list[str]:
     """Quantities of Stokes vectors that are drawn: those that were measured, or without data what a model has.
+
+    In the plane of incidence natural light gets neither U nor V.
 
     Raises
     ------
@@ -222,7 +226,8 @@ def measured_names(sources: Sequence[Source]) -> list[str]:
     """
     wanted = ("intensity", "Q/I", "U/I", "V/I", "dolp", "aolp")
     if all(source.dataset is None for source in sources):
-        return ["intensity", "Q/I", "dolp"]
+        natural = tuple(light) == NATURAL_LIGHT
+        return ["intensity", "Q/I", "dolp"] if natural else ["intensity", "Q/I", "U/I", "V/I", "dolp"]
     names = [name for name in wanted if any(source.channel(name) is not None for source in sources)]
     if not names:
         listed = ", ".join(source.name for source in sources)
@@ -232,14 +237,17 @@ def measured_names(sources: Sequence[Source]) -> list[str]:
     return names
 
 
-def light_of(sources: Sequence[Source]) -> tuple[float, ...]:
-    """Stokes vector of the light of all data; natural light without data.
+def light_of(sources: Sequence[Source], incident: Sequence[float] | None = None) -> tuple[float, ...]:
+    """Stokes vector of the light of all data; without data the ``incident`` one, natural light if None.
 
     Raises
     ------
     DataError
-        If the data were measured under different light.
+        If the data were measured under different light, or under another than is asked for.
+    ModelError
+        If ``incident`` is the Stokes vector of no light.
     """
+    asked = None if incident is None else tuple(check_incident(incident))
     lights = {
         source.name: tuple(float(x) for x in source.dataset.attrs["illumination"])
         for source in sources
@@ -247,4 +255,12 @@ def light_of(sources: Sequence[Source]) -> tuple[float, ...]:
     }
     if len(set(lights.values())) > 1:
         raise DataError(f"{', '.join(lights)} were measured under different light: draw them one by one")
-    return next(iter(lights.values()), NATURAL_LIGHT)
+    found = next(iter(lights.values()), NATURAL_LIGHT if asked is None else asked)
+    if asked is not None and not np.allclose(found, asked):
+        raise DataError(f"{next(iter(lights))} was measured under light of the Stokes vector {found}")
+    return found
+
+
+def light_note(light: Sequence[float]) -> str:
+    """What a title says of the light, nothing of natural light."""
+    return "" if tuple(light) == NATURAL_LIGHT else f", light {', '.join(f'{s:.3g}' for s in light)}"

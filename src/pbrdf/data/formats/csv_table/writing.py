@@ -16,10 +16,10 @@ from pbrdf.data.formats.csv_table.columns import COVARIANCES, ELEMENTS
 from pbrdf.data.formats.csv_table.ratios import RATIO_ELEMENTS
 from pbrdf.data.schema import COVARIANCE, NATURAL_LIGHT, VARIABLES, std_name
 from pbrdf.data.validation import validate
-from pbrdf.files.delimited import write_table
+from pbrdf.files.delimited import table_text, write_table
 from pbrdf.optics.stokes import STOKES
 
-__all__ = ["write_csv"]
+__all__ = ["csv_text", "write_csv"]
 
 
 def write_csv(ds: xr.Dataset, path: str | Path) -> None:
@@ -40,6 +40,18 @@ def write_csv(ds: xr.Dataset, path: str | Path) -> None:
     DataError
         If `ds` does not follow the schema or the file cannot be written.
     """
+    columns, statements = _parts(ds)
+    write_table(Path(path), columns, zip(*columns.values(), strict=True), statements)
+
+
+def csv_text(ds: xr.Dataset) -> str:
+    """What :func:`write_csv` writes."""
+    columns, statements = _parts(ds)
+    return table_text(columns, zip(*columns.values(), strict=True), statements)
+
+
+def _parts(ds: xr.Dataset) -> tuple[dict[str, list[str]], dict[str, str]]:
+    """Cells by the names of the columns, and what is stated above."""
     validate(ds)
     header = {"azimuth": "forward=0", "stokes": "p-s"}
     for name, value in plain_attributes(ds.attrs).items():
@@ -47,9 +59,8 @@ def write_csv(ds: xr.Dataset, path: str | Path) -> None:
             header[name] = "natural" if tuple(value) == NATURAL_LIGHT else ",".join(map(repr, value))
         elif name != "stokes_convention":
             header[name] = encode_attribute(name, value)
-    columns = dict(_text_columns(ds))
     statements = {name: header[name] for name in sorted(header, key=lambda name: name != "quantity")}
-    write_table(Path(path), columns, zip(*columns.values(), strict=True), statements)
+    return dict(_text_columns(ds)), statements
 
 
 def _text_columns(ds: xr.Dataset) -> Iterator[tuple[str, list[str]]]:

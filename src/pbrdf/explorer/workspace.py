@@ -1,0 +1,134 @@
+"""What is open beside the models: measured data, fits, maps, the state that the page begins with."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pbrdf.errors import PbrdfError
+from pbrdf.explorer.catalogue import layer_of, state_of
+from pbrdf.explorer.state import MOST_LAYERS
+from pbrdf.models.base import Model
+from pbrdf.models.registry import find_model
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from pbrdf.inversion.result import FitResult
+
+__all__ = ["MOST_OPEN", "Workspace"]
+
+#: Data sets that are open at once, at most.
+MOST_OPEN = 64
+#: Model that is shown with data alone, as it is what ``pbrdf.fit`` fits if it is not told another.
+_MODEL = "double-gauss"
+
+
+class Workspace:
+    """What one page works with.
+
+    The lists are kept as they are: pages whose workspaces are given the same lists see what any of them opens, so that
+    a page that is loaded again still has the files that were dropped on it.
+
+    Parameters
+    ----------
+    models, datasets, fits, maps
+        Pairs of a name and what is open. A fit's data stand among the data sets, too, see :meth:`add_fit`.
+
+    Attributes
+    ----------
+    at_close
+        Called when the page is closed: what runs for it ends there.
+    """
+
+    def __init__(
+        self,
+        models: list[tuple[str, Model]] | None = None,
+        datasets: list[tuple[str, xr.Dataset]] | None = None,
+        fits: list[tuple[str, FitResult]] | None = None,
+        maps: list[tuple[str, xr.Dataset]] | None = None,
+    ) -> None:
+        self.models = [] if models is None else models
+        self.datasets = [] if datasets is None else datasets
+        self.fits = [] if fits is None else fits
+        self.maps = [] if maps is None else maps
+        self.at_close: list[Callable[[], None]] = []
+
+    def again(self) -> Workspace:
+        """A workspace of the same things for another page."""
+        return Workspace(self.models, self.datasets, self.fits, self.maps)
+
+    def add_model(self, name: str, model: Model) -> None:
+        """Show a model from the beginning.
+
+        Raises
+        ------
+        PbrdfError
+            If its parameters are maps, or there are too many models.
+        """
+        if any(np.ndim(value) for value in model.values.values()):
+            raise PbrdfError(f"{name}: its parameters are arrays; give a model with single numbers")
+        if len(self.models) == MOST_LAYERS:
+            raise PbrdfError(f"{name}: the explorer shows {MOST_LAYERS} models at once; leave some out")
+        self.models.append((_free(name, self.models), model))
+
+    def add_dataset(self, name: str, dataset: xr.Dataset) -> str:
+        """Open measured data; returns the name that they have here, that of no others.
+
+        Raises
+        ------
+        PbrdfError
+            If nothing is measured in them, or too many are open.
+        """
+        from pbrdf.data.select import (
+            measured_channels,  # xarray takes as long to load as all else that a page needs
+        )
+
+        if not measured_channels(dataset):
+            raise PbrdfError(f"{name}: there is no measured value in it")
+        if len(self.datasets) >= MOST_OPEN:
+            raise PbrdfError(
+                f"{name}: {MOST_OPEN} data sets are open, more cannot be: start the explorer again"
+            )
+        free = _free(name, self.datasets)
+        self.datasets.append((free, dataset))
+        return free
+
+    def add_fit(self, name: str, result: FitResult) -> None:
+        """Open a fit: its model and its data, too."""
+        self.add_model(name, result.model)
+        self.add_dataset(name, result.dataset)
+        self.fits.append((_free(name, self.fits), result))
+
+    def state(self) -> dict[str, Any] | None:
+        """The state to begin with, None where nothing was given that has one."""
+        layers = [layer_of(name, model) for name, model in self.models]
+        if not layers and self.datasets:
+            kind = find_model(_MODEL)
+            layers = [layer_of(_MODEL, kind.from_values({p.name: p.default for p in kind.parameters}))]
+        if not layers:
+            return None
+        state = state_of(layers)
+        if self.datasets:
+            measured = np.rad2deg(self.datasets[0][1]["theta_i"].values)
+            state["light"]["theta_i"] = round(float(np.median(measured)), 3)
+        return state
+
+    def close(self) -> None:
+        """Give up what runs for the page."""
+        while self.at_close:
+            with suppress(Exception):
+                self.at_close.pop()()
+
+
+def _free(name: str, taken: list[tuple[str, Any]]) -> str:
+    """A name that none has yet: "paint.csv (2)" after "paint.csv"."""
+    names = {other for other, _ in taken}
+    number, free = 1, name
+    while free in names:
+        number += 1
+        free = f"{name} ({number})"
+    return free
