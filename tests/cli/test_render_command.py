@@ -58,7 +58,10 @@ def test_the_folder_of_a_fit_stands_for_its_model(run, tmp_path, paint):
 def test_paints_on_a_cameras_scale_are_told(run):
     result = run("render", "white", "--light", "point", *SMALL)
     assert "white reflects 1.78 of the light it gets" in result.stderr
+    assert "render white-scene, or give --albedo" in result.stderr
     assert "sphere-render/stokes.exr" in result.stdout
+    for right in (("white-scene",), ("white", "--albedo", 0.6)):
+        assert "reflects" not in run("render", *right, "--light", "point", *SMALL).stderr
 
 
 @pytest.mark.slow

@@ -43,8 +43,9 @@ def paints(as_json: AsJson = False) -> None:
     console.print(table)
     console.print(f"\nModel double-gauss at {WAVELENGTH:g} nm. Source: {_SOURCE}; {_SCALE}.")
     console.print(
-        f"For rendering, [bold]NAME-scene[/bold]: the same paint, with a such that it reflects {100 * SCENE_ALBEDO:g} % "
-        "under an even sky (a share of our choice) and no direction up to 85° sends back more than it gets."
+        f"For rendering, [bold]NAME-scene[/bold]: the same paint, with a such that it reflects "
+        f"{100 * SCENE_ALBEDO:g} % under an even sky (a share of our choice); light from up to 85° is never sent back "
+        "whole."
     )
     console.print(
         "Each name stands for the model in `pbrdf simulate`, `pbrdf plot` and `pbrdf render`; those of the paper also "

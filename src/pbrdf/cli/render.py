@@ -33,6 +33,13 @@ def render(
         ),
     ] = None,
     scene: Annotated[str, typer.Option(help="sphere, plate, car, or a Mitsuba scene FILE.xml.")] = "sphere",
+    albedo: Annotated[
+        float | None,
+        typer.Option(
+            help="Scale each model to reflect this share of an even sky's light: for fits to a camera's counts.",
+            show_default="the models' own amplitudes",
+        ),
+    ] = None,
     light: Annotated[
         str | None,
         typer.Option(help="point, area, sky, constant, or envmap:FILE.", show_default="sky"),
@@ -87,6 +94,8 @@ def render(
 
     A sphere under a clear sky: `pbrdf render white-scene`
 
+    A fit to a camera's counts: `pbrdf render paint-fit --albedo 0.6`
+
     Two paints, seen through a polariser: `pbrdf render white-scene pearl-white-scene --scene plate --polarizer 90`
     """
     from pbrdf.cli.sources import open_model
@@ -123,6 +132,10 @@ def render(
     else:
         require_writable_folder(target)
     paints = [open_model(source) for source in sources]
+    if albedo is not None:
+        from pbrdf.models.reflectance import with_albedo
+
+        paints = [with_albedo(model, albedo) for model in paints]
     for source, model in zip(sources, paints, strict=True):
         _warn_of_gain(source, model)
 
@@ -180,17 +193,11 @@ def _warn_of_gain(source: str, model: Model) -> None:
         return
     reflectance = float(directional_hemispherical_reflectance(model, math.radians(30.0)))
     if reflectance > 1.0:
-        from pbrdf.data.paints import SCENE_PAINTS
-
-        companion = f"{source}-scene"
         warn(
             f"{source} reflects {reflectance:.2f} of the light it gets: its amplitude a is on the scale of the camera "
             "that measured it; "
-            + (
-                f"{companion} is the same paint on the scale of a scene"
-                if is_paint(source) and companion in SCENE_PAINTS
-                else "compare no brightness with other things in the scene"
-            )
+            + (f"render {source}-scene, or " if is_paint(source) else "")
+            + "give --albedo, or compare no brightness with other things in the scene"
         )
 
 

@@ -2,8 +2,8 @@
 
 The parameters are Table 1 of Zhang, Song, Zhao, Infrared and Laser Engineering 46(11), 1117002 (2017), for
 476 nm; the amplitude ``a`` is on that paper's camera scale, so these paints reflect more than they receive. Each has a
-companion for rendering, ``NAME-scene``, whose ``a`` alone is another: scaled so that under an even sky the paint reflects
-the share :data:`SCENE_ALBEDO`, a round number of ours, for the paper states none.
+companion for rendering, ``NAME-scene``, whose ``a`` alone is another: scaled so that under an even sky the paint
+reflects the share :data:`SCENE_ALBEDO`, a round number of ours, for the paper states none.
 The measurements are simulated by ``scripts/make_bundled_experiment.py``: the paper published no raw data.
 """
 
@@ -33,16 +33,16 @@ PAINTS: dict[str, tuple[float, float, float, float, float, float]] = {
     "cd-back": (0.0346, 1.7420, 1.4927, 1.1945, 0.2749, 0.4686),
 }
 
-#: Share of the light of an even sky, 2 ∫ DHR(θ_i) cosθ_i sinθ_i dθ_i, that the companions for rendering reflect.
+#: Share of an even sky's light that the companions for rendering reflect, :func:`pbrdf.models.reflectance.albedo`.
 SCENE_ALBEDO = 0.6
 
-#: Diffuse amplitude ``a`` of the companions by name; ``tests/data/test_paints.py`` finds them again.
+#: Diffuse amplitude ``a`` of the companions by name, from :func:`pbrdf.models.reflectance.with_albedo`.
 SCENE_PAINTS: dict[str, float] = {
     "white-scene": 0.5724,
-    "matte-white-thin-scene": 0.7634,
+    "matte-white-thin-scene": 0.7633,
     "matte-white-thick-scene": 0.6758,
-    "pearl-white-scene": 2.8337,
-    "cd-back-scene": 0.6501,
+    "pearl-white-scene": 2.8331,
+    "cd-back-scene": 0.6500,
 }
 
 

@@ -69,7 +69,7 @@ class LambertGGX(pbrdf.Model):
         return f
 '''
 _SCENE = """\
-<!-- A painted ball on a grey ground under two lamps. pbrdf replaces every BSDF with the id paint, paint1, paint2, ... -->
+<!-- A painted ball on a grey ground. pbrdf render puts its models in place of BSDFs with the ids paint, paint1, ... -->
 <scene version="3.0.0">
     <integrator type="path"/>
     <sensor type="perspective">
