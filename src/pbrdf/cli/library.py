@@ -12,6 +12,7 @@ from pbrdf.cli.console import output_console, stage_bar, warn
 from pbrdf.cli.fit_options import fitted_model
 from pbrdf.cli.options import (
     Backend,
+    CommandGroup,
     ReadingCommand,
     library_option,
     quiet_option,
@@ -41,7 +42,9 @@ _MODEL = "double-gauss"
 _SAME_WAVELENGTH = 0.5
 
 library = typer.Typer(
+    cls=CommandGroup,
     no_args_is_help=True,
+    add_completion=False,
     help="Libraries of materials, each a mean and a scatter over specimens: what `pbrdf identify` compares with. "
     "Everywhere the library is the file that --library names, else library.json in this folder; without either the "
     "bundled paints are shown and compared with. A name that ends in .json, before all others, is the library too: "
@@ -96,7 +99,11 @@ def add(
     Fits that describe nothing are refused; those that describe their data in part, or whose parameters stand on bounds,
     are taken with a caution that the library keeps.
 
-    Two panels: `pbrdf library add white panel-1-fit panel-2-fit --library paints.json`
+    Files to try it with: `pbrdf example panels`
+
+    Two panels: `pbrdf library add pearl panels/pearl-white-1.csv panels/pearl-white-2.csv --library paints.json`
+
+    Two fits: `pbrdf library add white panel-1-fit panel-2-fit --library paints.json`
 
     One file: `pbrdf library add enamel enamel.csv --scatter sigma=0.15,n=0.02`
     """
