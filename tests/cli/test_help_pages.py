@@ -9,12 +9,11 @@ from collections import Counter
 import pytest
 import typer
 
-from pbrdf.cli.help_page import GROUPS, READING_PANEL, command_page
+from pbrdf.cli.help_page import GROUPS, READING_PANEL
 from pbrdf.cli.main import COMMANDS, app
 from pbrdf.instruments.virtual.examples import EXAMPLES
 
 ROOT = typer.main.get_command(app)
-CONTEXT = ROOT.context_class(ROOT, info_name="pbrdf")
 #: Pages by the words that ask for them.
 PAGES = [(), *((name,) for name in COMMANDS)]
 PAGES += [("library", name) for name in ROOT.commands["library"].commands]
@@ -34,8 +33,7 @@ SMALLER = {
     "measure": "--sample-angles 40 --patch 2",
     "plan": "--camera-positions 2",
     "render": "--size 16x16 --spp 16",
-    "export": "--theta-i 0:80:40 --theta-r 0:80:40 --phi 0:180:90",
-    "reproduce": "--starts 2",
+    "reduce": "--no-pictures",
 }
 #: What shows a page until it is stopped; what has tests of its own that take minutes.
 NOT_RUN = {"explore", "reproduce", "demo"}
@@ -50,6 +48,8 @@ def command(words):
 
 def shown(words):
     """What stands in backticks and begins with the command, in the order of its help."""
+    if hasattr(command(words), "commands"):
+        return []
     text = " ".join((command(words).help or "").split())
     return [
         line
@@ -70,7 +70,7 @@ def test_every_page_fits_into_80_columns(run, monkeypatch, words):
 
 
 def test_the_first_page_has_every_command_once():
-    assert Counter(name for names in GROUPS.values() for name in names) == Counter(COMMANDS)
+    assert Counter(name for names in GROUPS.values() for name in names) == Counter(list(COMMANDS))
 
 
 @pytest.mark.parametrize("words", PAGES[1:], ids=" ".join)
@@ -83,14 +83,12 @@ def test_common_options_come_first_and_are_few(words):
     assert all(count > 1 for panel, count in Counter(panels).items() if panel not in (None, READING_PANEL))
 
 
-def test_options_that_read_a_file_are_spelled_out_once():
-    pages = {
-        name: command_page(ROOT.commands[name], CONTEXT)
-        for name in ("check", "fit", "compare", "identify", "plot", "convert")
-    }
+def test_options_that_read_a_file_are_spelled_out_once(run):
+    names = ("check", "fit", "compare", "identify", "plot", "convert")
+    pages = {name: " ".join(run(name, "--help").stdout.split()) for name in names}
     for name, page in pages.items():
         assert f"{READING_PANEL}:" in page
-        assert ("--skip-invalid          Leave out" in page) == (name == "check")
+        assert ("--skip-invalid Leave out" in page) == (name == "check")
         assert ("see `pbrdf check --help`" in page) == (name != "check")
 
 
@@ -108,12 +106,16 @@ def test_examples_can_be_copied(run):
     assert shlex.split(line) == shlex.split(shown(("library", "add"))[0])
 
 
-def test_a_shell_completes_commands_and_options(run, monkeypatch):
+@pytest.mark.parametrize(
+    ("words", "expected"), [("pbrdf rend", "render"), ("pbrdf fit --hold", "--hold-out")]
+)
+def test_a_shell_completes_commands_and_options(monkeypatch, capsys, words, expected):
     monkeypatch.setenv("_PBRDF_COMPLETE", "complete_bash")
-    for words, expected in (("pbrdf rend", "render"), ("pbrdf fit --hold", "--hold-out")):
-        monkeypatch.setenv("COMP_WORDS", words)
-        monkeypatch.setenv("COMP_CWORD", str(words.count(" ")))
-        assert expected in run().stdout.split()
+    monkeypatch.setenv("COMP_WORDS", words)
+    monkeypatch.setenv("COMP_CWORD", str(words.count(" ")))
+    with pytest.raises(SystemExit):
+        app([], prog_name="pbrdf")
+    assert expected in capsys.readouterr().out.split()
 
 
 @pytest.mark.slow
@@ -130,7 +132,7 @@ def test_the_first_example_of_each_command_runs(run, words):
         for before in EXAMPLES[example].commands:
             if before.split()[1] == words[0]:
                 break
-            run(*shlex.split(before)[1:])
+            run(*shlex.split(before)[1:], *shlex.split(SMALLER.get(before.split()[1], "")))
     # what follows holds: of an option that is given twice the last one
     run(*shlex.split(first)[1:], *shlex.split(SMALLER.get(name, "")))
 

@@ -35,6 +35,7 @@ _SEARCH = "How the fit searches"
 _WORTH = "What else is asked of the fit"
 _WRITTEN = "What is written and shown"
 _ERRORS = "Errors of the measurement"
+_PLACES = "Where it may measure"
 _LIGHT = "Sun, lamp and sky"
 _TRACING = "Tracing of the rays"
 _RUN = "How it runs"
@@ -76,6 +77,9 @@ _SUBJECTS: dict[str, str] = {
             *("camera_error", "zero_error", "tilt_error"),
         ),
         _ERRORS,
+    ),
+    **dict.fromkeys(
+        ("out_of_plane", "camera_positions", "repeats", "smallest_bistatic", "largest_zenith"), _PLACES
     ),
     **dict.fromkeys(("sun_zenith", "sun_azimuth", "max_dolp", "optical_depth"), _LIGHT),
     **dict.fromkeys(("spp", "depth", "variant"), _TRACING),

@@ -161,7 +161,7 @@ def add(
     _say_written(file, len(changed.materials), had)
 
 
-@library.command("list")
+@library.command("list", cls=ReadingCommand)
 def list_materials(
     names: Annotated[
         list[str] | None, typer.Argument(metavar="[FILE]", help="The library.", show_default=False)
@@ -178,7 +178,7 @@ def list_materials(
     print_library(open_library(file), str(file or BUNDLED), output_console())
 
 
-@library.command()
+@library.command(cls=ReadingCommand)
 def show(
     names: Annotated[
         list[str] | None, typer.Argument(metavar="[NAME]", help="Materials.", show_default="all")
@@ -202,7 +202,7 @@ def show(
         print_material(material, console)
 
 
-@library.command()
+@library.command(cls=ReadingCommand)
 def remove(
     names: Annotated[list[str], typer.Argument(metavar="NAME", help="Materials to remove.")],
     library: _Changed = None,
