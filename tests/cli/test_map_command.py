@@ -19,6 +19,7 @@ from typer.testing import CliRunner
 
 import pbrdf
 from pbrdf.cli.main import app
+from pbrdf.inversion.map_store.made_from import MadeFrom
 from pbrdf.inversion.map_store.map_store import MapStore
 from pbrdf.inversion.parameter_map.map_fit import MapFit
 from pixel_helpers import blank, painted
@@ -132,6 +133,20 @@ def test_a_small_map_in_one_file_holds_the_same_numbers(at_trial, tmp_path):
     done = at_trial("map", "trial/reduced/stokes.zarr", "-g", "flat", "-o", "paint.zarr", *FIT, "-q")
     assert done.stdout == "paint.zarr\n"
     same(opened(tmp_path / "paint.nc"), opened(tmp_path / "paint.zarr"))
+
+
+@pytest.mark.slow
+def test_a_map_says_where_its_data_are(whole, at_trial, tmp_path):
+    """The explorer shows what was measured at a pixel."""
+    at_trial("map", "trial/reduced/stokes.zarr", "-g", "flat", "-o", "paint.nc", *FIT, "--starts", 1, "-q")
+    for path in (whole, tmp_path / "paint.nc"):
+        told = MadeFrom.of(opened(path).attrs)
+        assert (told.geometry, told.scale) == (("flat",), 1.0)
+        source = told.open(path.parent)
+        assert set(source.sizes) == {"y", "x"}
+        assert (source.block({})["label"].values[SAMPLES["white"]] != 0).all()
+    stored = json.loads(opened(whole).attrs["map_settings"])["input"]
+    assert json.loads(json.dumps(MadeFrom.of(opened(whole).attrs).open(whole.parent).identity())) == stored
 
 
 @pytest.mark.slow

@@ -236,6 +236,7 @@ def map_pixels(
         stokes = _reduced(stokes, polarimeter, angles, target, quiet)
     from pbrdf.instruments.pixel_geometry.labels import read_labels
     from pbrdf.inversion.map_store import open_map
+    from pbrdf.inversion.map_store.made_from import MadeFrom
     from pbrdf.inversion.map_store.map_store import MapStore
     from pbrdf.inversion.map_store.picture_source import PictureSource
     from pbrdf.inversion.parameter_map import MapFit
@@ -252,14 +253,15 @@ def map_pixels(
     if target.exists() and target.suffix == ".zarr":
         # before what pixels share is sought, which takes long
         MapStore(target, fit, source).require_same_settings(apart_from="fit.shared")
+    told = MadeFrom.relative_to(target.parent, stokes, geometry or (), counts_per_brdf, labels).attribute
     if target.suffix == ".nc":
-        found = _fit_in_memory(source, outline, chosen, target, {"labels": named, **arguments}, quiet)
+        found = _fit_in_memory(source, outline, chosen, target, {"labels": named, **arguments}, told, quiet)
     else:
         picture = report / _QUICK_LOOK if figures else None
         grid = _units(outline, fit.dims, unit, memory)
         if unit is not None and target.exists():
             _require_units(target, MapStore(target, fit, source).grid, grid)
-        if not _fill(target, fit, source, grid, place, scheduler, picture, quiet):
+        if not _fill(target, fit, source, grid, told, place, scheduler, picture, quiet):
             if quiet:
                 print(target)
             return
@@ -366,6 +368,7 @@ def _fit_in_memory(
     model: str | Model,
     target: Path,
     arguments: dict[str, Any],
+    told: dict[str, str],
     quiet: bool,
 ) -> xr.Dataset:
     """Fit a small map and write it into one file."""
@@ -381,7 +384,7 @@ def _fit_in_memory(
         )
     with stage_bar(quiet, _FITTING) as show:
         progress = functools.partial(show, f"{_FITTING}, pixels")
-        found = fit_map(source.block({}), model, progress=progress, **arguments)
+        found = fit_map(source.block({}), model, progress=progress, **arguments).assign_attrs(told)
     with atomic_file(target) as beside:
         write_netcdf_file(beside, {"/": found})
     return found
@@ -392,6 +395,7 @@ def _fill(
     fit: MapFit,
     source: PictureSource,
     grid: UnitGrid,
+    told: dict[str, str],
     place: tuple[int, int] | None,
     scheduler: str | None,
     picture: Path | None,
@@ -406,7 +410,8 @@ def _fill(
         kept = target.with_name(f"{target.stem}-shared.npz")
         with stage_bar(quiet, _SHARING) as show:
             fit = with_shared(fit, source, grid, kept, progress=functools.partial(show, f"{_SHARING}, units"))
-    store = prepare_store(target, fit, source, shard=dict(zip(grid.dims, grid.shard, strict=True)))
+    shard = dict(zip(grid.dims, grid.shard, strict=True))
+    store = prepare_store(target, fit, source, shard=shard, told=told)
     look = None if picture is None else QuickLook(store, picture)
     state = [0, store.grid.count]
     say_when_interrupted(

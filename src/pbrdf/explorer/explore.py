@@ -70,6 +70,7 @@ def explore(
 def _add(workspace: Workspace, name: str | None, thing: Any) -> None:
     import xarray as xr
 
+    from pbrdf.data.schema import DIMENSION, STOKES_AXES
     from pbrdf.data.validation import validate
     from pbrdf.inversion.result import FitResult
 
@@ -79,7 +80,11 @@ def _add(workspace: Workspace, name: str | None, thing: Any) -> None:
         workspace.add_fit(name or f"{thing.model.name} fitted", thing)
     elif isinstance(thing, xr.Dataset):
         if is_map(thing):
-            workspace.maps.append((name or "map", thing))
+            workspace.add_map(name or "map", thing)
+        elif {str(dim) for dim in thing.dims} - {DIMENSION, *STOKES_AXES}:
+            from pbrdf.inversion.map_store import DatasetSource
+
+            workspace.pictures.append((name or "data", DatasetSource(thing)))
         else:
             validate(thing, origin=name or "")
             workspace.add_dataset(name or str(thing.attrs.get("title") or "data"), thing)

@@ -24,6 +24,7 @@ PARTS = (
     "unsaid.js",
     "files.js",
     "views/hemisphere.js",
+    "views/map.js",
     "views/cuts.js",
     "views/sphere.js",
     "views/polar.js",

@@ -15,10 +15,14 @@ from pbrdf.models.registry import load_model
 if TYPE_CHECKING:
     import xarray as xr
 
+    from pbrdf.inversion.map_store.picture_source import PictureSource
+
 __all__ = ["is_map", "open_source"]
 
 #: Variables that maps of parameters have and no other data.
-_OF_MAPS = {"estimate", "standard_error", "status"}
+_OF_MAPS = {"estimate", "standard_error", "flags", "status", "chi2", "degrees_of_freedom"}
+#: Variables that maps of materials have; their probabilities of each material are not shown.
+_OF_MATERIALS = ("material", "confidence")
 
 
 def open_source(
@@ -34,7 +38,8 @@ def open_source(
     workspace
         Where it is opened.
     source
-        Name of a bundled paint, a model's JSON file, the folder of a fit, a map, or a file of data.
+        Name of a bundled paint, a model's JSON file, the folder of a fit, a map, the data of its pixels, or a
+        file of data.
     read
         Reads data.
     name
@@ -62,14 +67,17 @@ def open_source(
     elif path.suffix.lower() == ".json":
         workspace.add_model(name.removesuffix(".json"), load_model(path))
     elif (found := _map(path)) is not None:
-        workspace.maps.append((name, found))
+        workspace.add_map(name, found, path.resolve().parent)
+    elif (pixels := _pixels(path)) is not None:
+        workspace.pictures.append((name, pixels))
     else:
         workspace.add_dataset(name, read(source))
 
 
 def is_map(dataset: xr.Dataset) -> bool:
-    """Whether this is a map of parameters, as :func:`pbrdf.fit_map` and ``pbrdf map`` make it."""
-    return {str(variable) for variable in dataset.data_vars} >= _OF_MAPS
+    """Whether this is a map of parameters (:func:`pbrdf.fit_map`, ``pbrdf map``) or of materials (``identify``)."""
+    names = {str(variable) for variable in dataset.data_vars}
+    return names >= _OF_MAPS or (names >= {*_OF_MATERIALS} and "material_name" in dataset.coords)
 
 
 def _is_fit(path: Path) -> bool:
@@ -95,6 +103,18 @@ def _map(path: Path) -> xr.Dataset | None:
 
     found = open_netcdf(path)
     if is_map(found):
-        return found.load()
+        return (found[[*_OF_MATERIALS]].assign_coords(found.coords) if "material" in found else found).load()
     found.close()
     return None
+
+
+def _pixels(path: Path) -> PictureSource | None:
+    """Data that were measured at every pixel of an image, None if something else is there."""
+    if not path.is_dir() and path.suffix.lower() not in (".nc", ".nc4"):
+        return None
+    from pbrdf.inversion.map_store.picture_source import PictureSource
+
+    try:
+        return PictureSource.open([path])
+    except DataError:
+        return None

@@ -253,9 +253,13 @@ def chosen_data(state: State, workspace: Workspace) -> Choice | None:
     StateError
         If the settings are none, or name what is not there.
     """
+    settings = state.settings.get("data", {})
+    if workspace.maps:
+        from pbrdf.explorer.map_pixels import open_pixel
+
+        open_pixel(settings.get("set"), workspace)
     if not workspace.datasets:
         return None
-    settings = state.settings.get("data", {})
     by_name = dict(reversed(workspace.datasets))
     name = settings.get("set") or workspace.datasets[0][0]
     if not isinstance(name, str) or name not in by_name:
@@ -316,11 +320,12 @@ def _held_out(given: Any, dataset: xr.Dataset) -> HoldOut | None:
 
 def answer(request: dict[str, Any], buffers: Any, workspace: Workspace, emit: Emit) -> None:
     """Answer ``{"type": "data", "state": …}`` with what the page lists of the open data, the chosen one in detail."""
+    # pixels of maps have data that are opened when a state names them
+    some = workspace.datasets or workspace.maps
+    chosen = chosen_data(read_state(request.get("state")), workspace) if some else None
     names = [name for name, _ in workspace.datasets]
     content = {"type": "data", "id": request.get("id"), "sets": names, "chosen": None}
-    if names:
-        chosen = chosen_data(read_state(request.get("state")), workspace)
-        assert chosen is not None
+    if chosen is not None:
         content["chosen"] = chosen.measured.summary()
         process_of(workspace).warm()  # a fit may come
     emit(content, [])

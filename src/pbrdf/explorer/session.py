@@ -33,6 +33,7 @@ VIEWS = {
     "mueller": "pbrdf.explorer.views.mueller",
     "sphere": "pbrdf.explorer.views.sphere",
     "polar": "pbrdf.explorer.views.polar",
+    "map": "pbrdf.explorer.views.map",
 }
 #: Modules that answer the other requests, by the request's type; each has
 #: ``answer(request, buffers, workspace, emit)``.
@@ -41,6 +42,8 @@ REQUESTS: dict[str, str] = {
     "data": "pbrdf.explorer.points",
     "export": "pbrdf.explorer.exports",
     "fit": "pbrdf.explorer.fitting",
+    "map_picture": "pbrdf.explorer.maps",
+    "map_pixel": "pbrdf.explorer.map_pixels",
     "open": "pbrdf.explorer.uploads",
     "previews": "pbrdf.explorer.previews",
     "read_state": "pbrdf.explorer.reading",

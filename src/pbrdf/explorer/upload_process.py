@@ -82,6 +82,10 @@ def _opened(file: str, options: dict[str, Any]) -> dict[str, Any] | str:
         return str(error)
     except (TypeError, ValueError, KeyError) as error:
         return f"{file}: cannot be read: {error}"
+    if found.pictures:
+        return (
+            f"{file}: data of every pixel of an image are opened beside their map: pbrdf explore MAP {file}"
+        )
     return {name: getattr(found, name) for name in ("models", "datasets", "fits", "maps")}
 
 

@@ -133,13 +133,13 @@ def _opened(name: str, content: bytes, options: Mapping[str, Any], workspace: Wo
         found = open_apart(name, content, options, workspace.at_close)
     datasets = [(workspace.add_dataset(own, dataset), dataset) for own, dataset in found.datasets]
     workspace.fits += found.fits
-    workspace.maps += found.maps
+    maps = [workspace.add_map(own, dataset) for own, dataset in found.maps]
     return {
         "name": name,
         "layers": [layer_of(own, model) for own, model in found.models],
         "datasets": [own for own, _ in datasets],
         "lines": [line for _, dataset in datasets for line in describe(dataset)],
-        "maps": [own for own, _ in found.maps],
+        "maps": maps,
     }
 
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from contextlib import suppress
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,6 +19,7 @@ from pbrdf.models.registry import find_model
 if TYPE_CHECKING:
     import xarray as xr
 
+    from pbrdf.inversion.map_store import MapSource
     from pbrdf.inversion.result import FitResult
 
 __all__ = ["MOST_OPEN", "Workspace"]
@@ -25,6 +28,8 @@ __all__ = ["MOST_OPEN", "Workspace"]
 MOST_OPEN = 64
 #: Model that is shown with data alone, as it is what ``pbrdf.fit`` fits if it is not told another.
 _MODEL = "double-gauss"
+#: Views that stand on the page at first where a map is open.
+_VIEWS_OF_MAPS = ("cuts", "map")
 
 
 class Workspace:
@@ -37,6 +42,11 @@ class Workspace:
     ----------
     models, datasets, fits, maps
         Pairs of a name and what is open. A fit's data stand among the data sets, too, see :meth:`add_fit`.
+    pictures
+        Data that were measured at every pixel of an image, by name.
+    map_folders
+        By the names of maps that lie in a file of this machine, the folders of these: what they were made from can be
+        found there. A map that was dropped on the page has none.
 
     Attributes
     ----------
@@ -50,16 +60,20 @@ class Workspace:
         datasets: list[tuple[str, xr.Dataset]] | None = None,
         fits: list[tuple[str, FitResult]] | None = None,
         maps: list[tuple[str, xr.Dataset]] | None = None,
+        pictures: list[tuple[str, MapSource]] | None = None,
+        map_folders: list[tuple[str, Path]] | None = None,
     ) -> None:
         self.models = [] if models is None else models
         self.datasets = [] if datasets is None else datasets
         self.fits = [] if fits is None else fits
         self.maps = [] if maps is None else maps
+        self.pictures = [] if pictures is None else pictures
+        self.map_folders = [] if map_folders is None else map_folders
         self.at_close: list[Callable[[], None]] = []
 
     def again(self) -> Workspace:
         """A workspace of the same things for another page."""
-        return Workspace(self.models, self.datasets, self.fits, self.maps)
+        return Workspace(self.models, self.datasets, self.fits, self.maps, self.pictures, self.map_folders)
 
     def add_model(self, name: str, model: Model) -> None:
         """Show a model from the beginning.
@@ -103,15 +117,37 @@ class Workspace:
         self.add_dataset(name, result.dataset)
         self.fits.append((_free(name, self.fits), result))
 
+    def add_map(self, name: str, dataset: xr.Dataset, folder: Path | None = None) -> str:
+        """Open a map; returns the name that it has here, that of no others.
+
+        Parameters
+        ----------
+        folder
+            That it lies in, if what it was made from may be looked for there.
+        """
+        if len(self.maps) >= MOST_OPEN:
+            raise PbrdfError(f"{name}: {MOST_OPEN} maps are open, more cannot be: start the explorer again")
+        free = _free(name, self.maps)
+        self.maps.append((free, dataset))
+        if folder is not None:
+            self.map_folders.append((free, folder))
+        return free
+
     def state(self) -> dict[str, Any] | None:
         """The state to begin with, None where nothing was given that has one."""
         layers = [layer_of(name, model) for name, model in self.models]
-        if not layers and self.datasets:
+        if not layers and (self.datasets or self.maps):
             kind = find_model(_MODEL)
-            layers = [layer_of(_MODEL, kind.from_values({p.name: p.default for p in kind.parameters}))]
+            if self.maps and not self.datasets:
+                # the sliders of the map's own model
+                with suppress(PbrdfError):
+                    kind = find_model(model_name(self.maps[0][1]))
+            layers = [layer_of(kind.name, kind.from_values({p.name: p.default for p in kind.parameters}))]
         if not layers:
             return None
         state = state_of(layers)
+        if self.maps:
+            state["settings"]["page"] = {"views": list(_VIEWS_OF_MAPS)}
         if self.datasets:
             measured = np.rad2deg(self.datasets[0][1]["theta_i"].values)
             state["light"]["theta_i"] = round(float(np.median(measured)), 3)
@@ -122,6 +158,20 @@ class Workspace:
         while self.at_close:
             with suppress(Exception):
                 self.at_close.pop()()
+
+
+def model_name(dataset: xr.Dataset) -> str:
+    """Name of the model of a map of parameters.
+
+    Raises
+    ------
+    PbrdfError
+        If the map does not say.
+    """
+    try:
+        return str(json.loads(str(dataset.attrs["model"]))["model"])
+    except (KeyError, TypeError, ValueError):
+        raise PbrdfError("this map does not say of which model its parameters are") from None
 
 
 def _free(name: str, taken: list[tuple[str, Any]]) -> str:

@@ -46,6 +46,7 @@ const ICONS = {
   remove: "M6 6l12 12 M18 6 6 18",
   reset: "M4 5v5h5 M4.6 10A8 8 0 1 1 4 13",
   add: "M12 5v14 M5 12h14",
+  less: "M5 12h14",
   enlarge: "M14 4h6v6 M20 4l-7 7 M10 20H4v-6 M4 20l7-7",
 };
 const icon = name => drawn("svg", { viewBox: "0 0 24 24", class: "icon", "aria-hidden": "true" }, drawn("path", { d: ICONS[name] }));

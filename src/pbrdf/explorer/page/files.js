@@ -22,10 +22,12 @@ function openFiles(app, el) {
     }
   }
   app.on("answer:opened", ({ name, layers, datasets, maps }) => {
+    const begins = !app.state;
     app.tell("note", `${name} is open.`);
     for (const layer of layers) addLayer(app, layer);
     // data want a model beside them
     if (!app.state && datasets.length + maps.length) addLayer(app, defaultLayer(app, Object.keys(app.catalogue.models)[0]));
+    if (maps.length) showMap(app, maps[0], begins && !datasets.length ? ["cuts"] : FIRST_VIEWS);
   });
 
   // Files are taken wherever on the explorer they fall.

@@ -78,6 +78,7 @@ def prepare_store(
     *,
     shard: Mapping[str, int] | None = None,
     chunk: Mapping[str, int] | None = None,
+    told: Mapping[str, str] | None = None,
 ) -> MapStore:
     """Make the store of a map, or find the one that was begun.
 
@@ -92,6 +93,8 @@ def prepare_store(
     shard, chunk
         Pixels of a unit and of a chunk along dimensions of the map, see
         :meth:`pbrdf.inversion.map_store.unit_grid.UnitGrid.of`; a store that is there keeps its own.
+    told
+        Attributes of a new store beside those of the fit, which decide nothing.
 
     Returns
     -------
@@ -111,7 +114,7 @@ def prepare_store(
         template = fit.template()
         grid = UnitGrid.of({dim: template.sizes[dim] for dim in fit.dims}, shard, chunk)
         with atomic_new_folder(path) as folder:
-            _write_template(folder, template, grid, store.settings)
+            _write_template(folder, template.assign_attrs(told or {}), grid, store.settings)
     store.require_same_settings()
     return store
 

@@ -16,12 +16,12 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-__all__ = ["ClassCount", "class_counts", "class_figure"]
+__all__ = ["NONE", "WITHOUT", "ClassCount", "class_counts", "class_figure", "colours_of_materials"]
 
 #: Pixels along a side of a picture, at most.
 _MOST = 600
 #: What is like no material, and what was not measured.
-_NONE, _WITHOUT = "#222222", "#DADADA"
+NONE, WITHOUT = "#222222", "#DADADA"
 _LARGEST, _LEGEND = 4.6, 2.5
 
 
@@ -87,7 +87,7 @@ def class_figure(found: xr.Dataset, title: str) -> Figure:
 
     material, confidence, labels = _shown(found)
     counts = class_counts(found)
-    colours = _colours(len(found["material_name"]))
+    colours = colours_of_materials(len(found["material_name"]))
     with styled():
         rows, columns = material.shape
         scale = _LARGEST / max(rows, columns)
@@ -95,11 +95,11 @@ def class_figure(found: xr.Dataset, title: str) -> Figure:
         figure = new_figure(2.0 * width + _LEGEND + 1.7, max(height + 1.1, 0.22 * len(counts) + 0.9))
         left, right = figure.subplots(1, 2, sharex=True, sharey=True)
         # material c is colour c + 2: those that are none come first
-        palette = ListedColormap([_WITHOUT, _NONE, *colours])
+        palette = ListedColormap([WITHOUT, NONE, *colours])
         norm = BoundaryNorm(np.arange(NOT_MEASURED - 0.5, len(colours) + 0.5), palette.N)
         _draw(left, material, cmap=palette, norm=norm)
         left.set_title("most probable material of the set", fontsize=10.0)
-        ground = ListedColormap([_WITHOUT, _NONE])
+        ground = ListedColormap([WITHOUT, NONE])
         _draw(right, np.where(material < 0, material, np.nan), cmap=ground, norm=Normalize(-2.5, -0.5))
         image = _draw(right, confidence, cmap="viridis", norm=Normalize(_least(confidence), 1.0))
         right.set_title("its probability", fontsize=10.0)
@@ -163,7 +163,7 @@ def _least(confidence: np.ndarray) -> float:
     return max(min(math.floor(10.0 * lowest) / 10.0, 0.9), 0.0)
 
 
-def _colours(count: int) -> list[Any]:
+def colours_of_materials(count: int) -> list[Any]:
     """Colours of the materials: Okabe and Ito's without black, which stands for none; of more, matplotlib's twenty."""
     named = [look.colour for look in looks_of(7)][:6]
     if count <= len(named):

@@ -14,7 +14,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pbrdf.report.numbers import brief, per_cent
-from pbrdf.report.parameter_map.shown_map import GOOD, PENDING, WITHOUT, ShownMap
+from pbrdf.report.parameter_map.colours import (
+    LEFT_OUT,
+    MASKED,
+    NO_RESULT,
+    NOT_YET,
+    ON_BOUND,
+    UNDETERMINED,
+    WIDE,
+    colours_of_states,
+    scale_of,
+)
+from pbrdf.report.parameter_map.shown_map import WITHOUT, ShownMap
 from pbrdf.report.picture_grid import Margins, beside, panel_height, picture_grid
 from pbrdf.report.style import BLUE, GREY, RED, styled
 
@@ -24,24 +35,10 @@ if TYPE_CHECKING:
 
 __all__ = ["HELD", "drawn_parameters", "overview_figure", "parameter_figure", "quality_figure"]
 
-#: Percentages of the pixels that a scale leaves out at each end.
-LEFT_OUT = 1.0
-#: What the figures say of that.
+#: What the figures say of their scales.
 HELD = f"scales hold the middle {100.0 - 2.0 * LEFT_OUT:g} % of the pixels"
 _VALUES, _ERRORS = "viridis", "cividis"
-_MASKED, _HATCH, _NO_RESULT, _PENDING = "#D9D9D9", "#A6A6A6", "#D55E00", "#FFFFFF"
-#: A parameter that the data of a pixel do not determine, and one on a bound in the map of standard errors.
-_UNDETERMINED, _ON_BOUND = "#CC79A7", "#009E73"
-#: Colours of the states of a pixel, those of other names after them.
-_STATES = {
-    GOOD: "#56B4E9",
-    "not_converged": "#E69F00",
-    "too_few_values": "#F0E442",
-    "failed": _NO_RESULT,
-    **dict.fromkeys(WITHOUT, _MASKED),
-    PENDING: _PENDING,
-}
-_OTHER_STATES = ("#009E73", "#000000")
+_HATCH = "#A6A6A6"
 #: Counts as colours, 0 or 1 first; the last one stands for more as well.
 _COUNTS = ("#F0F0F0", "#A6CEE3", "#3F7FBF", "#1B3A78", "#000000")
 #: Width of panels, inches, and the space around them.
@@ -52,8 +49,6 @@ _QUALITY_MARGINS = Margins(0.8, 0.75, 0.95, 0.95, 1.6, 0.95)
 _ACROSS, _SOME = (3, 4), 9
 #: Height over width of the panels of a line.
 _LINE = 0.6
-#: Errors whose scale spans more than this factor are shown in their logarithm.
-_WIDE = 20.0
 #: Bars of a histogram, at most.
 _BINS = 60
 
@@ -204,22 +199,10 @@ def _label_axes(ax: Axes, shown: ShownMap, *, down: bool, across: bool) -> None:
             ax.set_ylabel(shown.coordinates[dims[0]][1])
 
 
-def _scale(values: np.ndarray) -> tuple[float, float]:
-    """Ends of a scale that holds nearly all of these numbers."""
-    values = values[np.isfinite(values)]
-    if values.size == 0:
-        return 0.0, 1.0
-    low, high = (float(v) for v in np.percentile(values, (LEFT_OUT, 100.0 - LEFT_OUT)))
-    if high - low <= 1e-9 * max(abs(low), abs(high)):
-        wide = 0.05 * max(abs(low), abs(high)) or 0.5
-        low, high = low - wide, high + wide
-    return low, high
-
-
 def _ground(ax: Axes) -> None:
     """Hatch what has no pixels drawn on it."""
     ax.grid(False)
-    ax.set_facecolor(_MASKED)
+    ax.set_facecolor(MASKED)
     ax.patch.set_hatch("////")
     ax.patch.set_edgecolor(_HATCH)
     ax.patch.set_linewidth(0.0)
@@ -249,8 +232,8 @@ def _without_result(shown: ShownMap) -> np.ndarray:
 
 def _others(ax: Axes, shown: ShownMap) -> None:
     """Pixels without a result, and those that nobody has come to."""
-    _plain(ax, shown, _without_result(shown), _NO_RESULT)
-    _plain(ax, shown, shown.pending, _PENDING)
+    _plain(ax, shown, _without_result(shown), NO_RESULT)
+    _plain(ax, shown, shown.pending, NOT_YET)
 
 
 def _bar(ax: Axes, image: Any, label: str, values: np.ndarray, low: float, high: float) -> None:
@@ -289,12 +272,12 @@ def _legend(figure: Figure, shown: ShownMap, parameters: Sequence[int] = (), *, 
         (
             shown.masked,
             "not measured or left out",
-            {"facecolor": _MASKED, "edgecolor": _HATCH, "hatch": "////"},
+            {"facecolor": MASKED, "edgecolor": _HATCH, "hatch": "////"},
         ),
-        (_without_result(shown), "no result", {"color": _NO_RESULT}),
-        (shown.pending, "not yet fitted", {"facecolor": _PENDING, "edgecolor": "black"}),
-        (np.array(undetermined), "undetermined", {"color": _UNDETERMINED}),
-        (np.array(without), "on a bound: no standard error", {"color": _ON_BOUND}),
+        (_without_result(shown), "no result", {"color": NO_RESULT}),
+        (shown.pending, "not yet fitted", {"facecolor": NOT_YET, "edgecolor": "black"}),
+        (np.array(undetermined), "undetermined", {"color": UNDETERMINED}),
+        (np.array(without), "on a bound: no standard error", {"color": ON_BOUND}),
     )
     for where, words, options in kinds:
         if where.any():
@@ -308,7 +291,7 @@ def _legend(figure: Figure, shown: ShownMap, parameters: Sequence[int] = (), *, 
 
 def _draw_values(ax: Axes, shown: ShownMap, parameter: int, *, band: bool = False) -> None:
     label, values, good = shown.labels[parameter], shown.estimate[parameter], shown.determined(parameter)
-    low, high = _scale(values[good])
+    low, high = scale_of(values[good])
     if len(shown.window.dims) == 1:
         values = np.where(good, values, np.nan)
         _line(ax, shown, values, shown.standard_error[parameter] if band else None)
@@ -318,7 +301,7 @@ def _draw_values(ax: Axes, shown: ShownMap, parameter: int, *, band: bool = Fals
         return
     _ground(ax)
     image = _picture(ax, shown, values, good & np.isfinite(values), cmap=_VALUES, vmin=low, vmax=high)
-    _plain(ax, shown, shown.good & ~good, _UNDETERMINED)
+    _plain(ax, shown, shown.good & ~good, UNDETERMINED)
     _others(ax, shown)
     _bar(ax, image, label.unit, values[good], low, high)
 
@@ -332,8 +315,8 @@ def _draw_errors(ax: Axes, shown: ShownMap, parameter: int | None) -> None:
     else:
         values, unit = shown.standard_error[parameter], shown.labels[parameter].unit
     where = shown.good & np.isfinite(values) & (values >= 0.0)
-    low, high = _scale(values[where])
-    wide = low > 0.0 and high / low > _WIDE
+    low, high = scale_of(values[where])
+    wide = low > 0.0 and high / low > WIDE
     if not wide:
         low = 0.0
     if len(shown.window.dims) == 1:
@@ -349,8 +332,8 @@ def _draw_errors(ax: Axes, shown: ShownMap, parameter: int | None) -> None:
     image = _picture(ax, shown, values, where, cmap=_ERRORS, norm=norm)
     if parameter is not None:
         determined = shown.determined(parameter)
-        _plain(ax, shown, shown.good & ~determined, _UNDETERMINED)
-        _plain(ax, shown, determined & ~where, _ON_BOUND)
+        _plain(ax, shown, shown.good & ~determined, UNDETERMINED)
+        _plain(ax, shown, determined & ~where, ON_BOUND)
     _others(ax, shown)
     _bar(ax, image, unit, values[where], low, high)
 
@@ -365,7 +348,7 @@ def _line(ax: Axes, shown: ShownMap, values: np.ndarray, errors: np.ndarray | No
         ax.fill_between(at, values - errors, values + errors, color=BLUE, alpha=0.25, linewidth=0.0)
     if at.size > 1:
         ax.set_xlim(at[0], at[-1])
-    for where, colour in ((shown.masked, _HATCH), (_without_result(shown), _NO_RESULT)):
+    for where, colour in ((shown.masked, _HATCH), (_without_result(shown), NO_RESULT)):
         ax.plot(
             at[where],
             np.zeros(where.sum()),
@@ -380,8 +363,7 @@ def _draw_states(ax: Axes, shown: ShownMap) -> None:
     from matplotlib.colors import ListedColormap
     from matplotlib.patches import Patch
 
-    others = iter(_OTHER_STATES)
-    colours = [_STATES.get(name) or next(others, "#000000") for name in shown.states]
+    colours = colours_of_states(shown.states)
     _ground(ax)
     if len(shown.window.dims) == 1:
         ax.imshow(
@@ -463,7 +445,7 @@ def _draw_histogram(ax: Axes, shown: ShownMap, parameter: int) -> None:
     if values.size == 0:
         ax.text(0.5, 0.5, "no pixel determines it", transform=ax.transAxes, ha="center", color=GREY)
         return
-    low, high = _scale(values)
+    low, high = scale_of(values)
     ax.hist(values, bins=_bins(values), range=(low, high), color=BLUE, alpha=0.75)
     middle, error = (
         float(np.median(values)),
@@ -507,12 +489,12 @@ def _draw_goodness(ax: Axes, shown: ShownMap) -> None:
     if values.size == 0 or freedom.size == 0:
         ax.text(0.5, 0.5, "no pixel has a χ²", transform=ax.transAxes, ha="center", color=GREY)
         return
-    low, high = _scale(values)
+    low, high = scale_of(values)
     typical = int(np.median(freedom))
     expected = stats.chi2(typical)
     low, high = min(low, expected.ppf(0.01) / typical), max(high, expected.ppf(0.99) / typical)
     count = _bins(values)
-    wide = high > _WIDE * low > 0.0
+    wide = high > WIDE * low > 0.0
     edges = (np.geomspace if wide else np.linspace)(low, high, count + 1)
     ax.hist(values, bins=edges.tolist(), color=BLUE, alpha=0.75, label="found")
     if wide:
