@@ -230,9 +230,10 @@ def _write_frames(path: Path) -> None:
     )
     measurement = experiment.measure({name: load_paint(name) for name in _PAINTS})
     write_measurement(measurement, path)
-    labels = np.zeros(measurement.frames.array.shape[-2:], np.uint8)
+    _, _, rows, columns = measurement.frames.array.shape
+    labels = np.zeros((rows, columns), np.uint8)
     for number, region in enumerate(measurement.regions.values(), 1):
-        labels[region.mask(0, len(labels), labels.shape[1])] = number
+        labels[region.mask(0, rows, columns)] = number
     Image.fromarray(labels).save(path / "labels.png")
 
 
