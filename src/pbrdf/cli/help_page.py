@@ -149,7 +149,8 @@ def _parts(help: str) -> tuple[list[str], list[tuple[str, str]]]:
 
 def _copied(command: str) -> Iterator[str]:
     """A command line to copy, continued where it is too long."""
-    words, line = command.split(), " "
+    # an option stays with its value
+    words, line = re.findall(r"-\S+ [^-\s]\S*|\S+", command), " "
     for word in words:
         if len(line) + len(word) + 3 > _WIDTH:
             yield f"{line} \\"
