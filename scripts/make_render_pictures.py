@@ -1,4 +1,4 @@
-"""Make the rendered pictures of the documentation: ``docs/images/{car,spheres,pbsdf-vs-plugin,inverse-rendering}.png``.
+"""Make the rendered pictures of the documentation: ``docs/images/{fender,spheres,pbsdf-vs-plugin,…}.png``.
 
 Run it with: python scripts/make_render_pictures.py [NAME …]   (needs mitsuba; minutes)
 """
@@ -28,7 +28,7 @@ from pbrdf.report.style import new_figure, save_figure, styled
 
 DOCS = Path(__file__).parents[1] / "docs"
 #: Size of the pictures in the documentation, in that of the command's.
-_SCALE = 0.62
+_SCALE = 0.5
 #: A dark, smooth car paint, and a semi-gloss one.
 GLOSSY = pbrdf.DoubleGauss(sigma=0.01, n=1.55, a=0.08, k=1.1, b=0.1, t=0.6)
 SEMIGLOSS = pbrdf.DoubleGauss(sigma=0.06, n=1.6, a=0.3, k=1.2, b=0.2, t=0.6)
@@ -42,9 +42,9 @@ def scene(
     return make_scene(subject(name, bsdfs, size[0] / size[1]), "sky", size, sky=sky)
 
 
-def car(target: Path) -> None:
-    """The car's panel in dark paint."""
-    picture = render_stokes(scene("car", [bsdf_dict(GLOSSY)], (480, 320), 50.0, 215.0), spp=512)
+def fender(target: Path) -> None:
+    """The fender of a car in dark paint."""
+    picture = render_stokes(scene("fender", [bsdf_dict(GLOSSY)], (480, 320), 50.0, 215.0), spp=512)
     save_small(stokes_figure(picture, "σ = 0.01, n = 1.55, a = 0.08 under a clear sky"), target)
 
 
@@ -132,7 +132,7 @@ def save_small(figure: Any, target: Path) -> None:
 
 
 PICTURES: dict[str, Callable[[Path], None]] = {
-    "car": car,
+    "fender": fender,
     "spheres": spheres,
     "pbsdf-vs-plugin": pbsdf_vs_plugin,
     "inverse-rendering": inverse_rendering,

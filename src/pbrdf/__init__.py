@@ -22,7 +22,7 @@ from pbrdf.presentation import provide_presenter
 from pbrdf.version import __version__
 
 if TYPE_CHECKING:
-    from pbrdf.data import check, make_dataset, read, validate, write
+    from pbrdf.data import check, convert, make_dataset, read, validate, write
     from pbrdf.data.paints import PAINTS, load_paint, open_experiment
     from pbrdf.data.readers import register_reader
     from pbrdf.explorer.explore import explore
@@ -85,7 +85,7 @@ if TYPE_CHECKING:
     )
     from pbrdf.models.reflectance import directional_hemispherical_reflectance
     from pbrdf.optics.mueller import coherency_eigenvalues
-    from pbrdf.optics.stokes import aolp, docp, dolp, dop
+    from pbrdf.optics.stokes import aolp, docp, dolp, dop, ellipticity
     from pbrdf.planning.plan import plan
     from pbrdf.rendering.bsdf import register as register_bsdf
     from pbrdf.rendering.export import write_merl, write_pbsdf
@@ -110,6 +110,7 @@ _HOME = {
     "dolp": "pbrdf.optics.stokes",
     "docp": "pbrdf.optics.stokes",
     "aolp": "pbrdf.optics.stokes",
+    "ellipticity": "pbrdf.optics.stokes",
     "coherency_eigenvalues": "pbrdf.optics.mueller",
     # data sets
     "read": "pbrdf.data",
@@ -119,6 +120,8 @@ _HOME = {
     "check": "pbrdf.data",
     "validate": "pbrdf.data",
     "open_experiment": "pbrdf.data.paints",
+    # what other programs give, in our convention
+    "convert": "pbrdf.data",
     # fit
     "fit": "pbrdf.inversion",
     "FitResult": "pbrdf.inversion",
@@ -223,12 +226,14 @@ __all__ = [
     "coherency_eigenvalues",
     "compare",
     "contour",
+    "convert",
     "cross_validate",
     "directional_hemispherical_reflectance",
     "division_of_focal_plane",
     "docp",
     "dolp",
     "dop",
+    "ellipticity",
     "error_analysis",
     "explore",
     "fit",

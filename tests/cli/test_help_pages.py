@@ -35,8 +35,8 @@ SMALLER = {
     "render": "--size 16x16 --spp 16",
     "reduce": "--no-pictures",
 }
-#: What shows a page until it is stopped; what has tests of its own that take minutes.
-NOT_RUN = {"explore", "reproduce", "demo"}
+#: What shows a page until it is stopped; what has tests of its own that take minutes; what takes another program's file.
+NOT_RUN = {"explore", "reproduce", "demo", "compare-with"}
 
 
 def command(words):

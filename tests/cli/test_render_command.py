@@ -6,6 +6,8 @@ import math
 import numpy as np
 import pytest
 
+import pbrdf
+
 pytest.importorskip("mitsuba", reason="rendering needs mitsuba: pip install 'mitsuba>=3.9'")
 
 SMALL = ("--size", "24x16", "--spp", "32", "--quiet")
@@ -104,7 +106,8 @@ def test_a_scene_file_is_rendered_in_its_own_size(run, tmp_path, paint):
         (("nothing.json",), "nothing.json: cannot be read as a model"),
         (("PAINT", "--size", "24"), "--size '24': give WIDTHxHEIGHT"),
         (("PAINT", "--size", "0x24"), "--size 0x24: width and height"),
-        (("PAINT", "--scene", "teapot"), "choose sphere, plate, car"),
+        (("PAINT", "--scene", "teapot"), "choose sphere, plate, fender"),
+        (("PAINT", "--scene", "car"), "it shows a fender, and is called so"),
         (("PAINT", "--scene", "missing.xml"), "missing.xml"),
         (("PAINT", "--light", "moon"), "choose one of point, area"),
         (("PAINT", "--light", "envmap:missing.exr"), "there is no file missing.exr"),
@@ -135,3 +138,76 @@ def test_a_map_of_parameters_covers_the_surface(run, tmp_path):
     on_panel = column[4:12]
     assert math.isfinite(on_panel.sum())
     assert on_panel.max() > 3.0 * on_panel.min()
+
+
+@pytest.mark.slow
+def test_three_wavelengths_make_a_picture_in_colour(run, tmp_path):
+    """Paints that reflect blue, green and red light more and more, under a sky whose air scatters blue most."""
+    from pbrdf.rendering.picture import read_exr
+
+    for nm, a in ((450, 0.1), (550, 0.2), (650, 0.4)):
+        content = {**PAINT, "parameters": {**PAINT["parameters"], "a": a, "b": 0.1}}
+        (tmp_path / f"{nm}.json").write_text(json.dumps(content))
+    models = ("450.json", "550.json", "650.json")
+    run("render", *models, *SMALL, "--wavelength", "450,550,650", "-o", "colour")
+    folder = tmp_path / "colour"
+    pictures = {nm: read_exr(folder / f"stokes_{nm}.exr") for nm in (450, 550, 650)}
+    assert {p.name for p in folder.glob("*.png")} == {
+        "stokes_450.png",
+        "stokes_550.png",
+        "stokes_650.png",
+        "rgb.png",
+    }
+    assert [float(p.attrs["wavelength"]) for p in pictures.values()] == [450.0, 550.0, 650.0]
+    top, middle = (
+        [float(p.stokes[0][where].mean()) for p in pictures.values()]
+        for where in (np.s_[0], np.s_[6:10, 9:15])
+    )
+    # near the horizon the light that is scattered most is weakened most on its way
+    assert top[0] < 0.9 * top[1] < 0.9 * top[2]
+    assert middle[0] < middle[2]
+    # at 550 nm the sky is the one without a wavelength
+    run("render", "550.json", *SMALL, "-o", "plain.exr")
+    np.testing.assert_allclose(
+        read_exr(tmp_path / "plain.exr").stokes[0][0], pictures[550].stokes[0][0], rtol=1e-4
+    )
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--wavelength", "450,550"), "give one in nm, or three different ones"),
+        (("--wavelength", "450,450,650"), "three different ones"),
+        (("--wavelength", "blue"), "not a number"),
+        (("--wavelength", "450,550,650"), "each object needs 3 models, one for each wavelength"),
+        (("PAINT", "PAINT", "--wavelength", "450,550,650", "-o", "x.exr"), "several files; give a folder"),
+    ],
+)
+def test_wavelengths_that_do_not_fit_are_refused(refused, paint, arguments, message):
+    assert message in refused("render", paint, *(paint if a == "PAINT" else a for a in arguments))
+
+
+@pytest.mark.slow
+def test_a_fit_with_parameters_of_each_wavelength_paints_in_colour(tmp_path):
+    from pbrdf.cli.wavelengths import painted_with
+    from pbrdf.errors import PbrdfError
+
+    paint = pbrdf.load_paint("white")
+    theta_r = np.tile(np.deg2rad(np.arange(0.0, 80.0, 8.0)), 3)
+    nm = np.repeat([450.0, 550.0, 650.0], 10)
+    stokes = np.asarray(paint.stokes(0.6, theta_r, 0.0)) * (nm / 550.0)[:, None]
+    ds = pbrdf.make_dataset(
+        0.6, theta_r, 0.0, quantity="brdf", I=stokes[:, 0], Q=stokes[:, 1], U=stokes[:, 2], wavelength=nm
+    )
+    held = {name: value for name, value in paint.values.items() if name != "a"}
+    pbrdf.fit(ds, fix=held, split={"a": "wavelength"}, starts=2).save(tmp_path / "f")
+    source = str(tmp_path / "f")
+    ((name, models),) = painted_with([source], [450.0, 550.0, 650.0])
+    assert name == source
+    np.testing.assert_allclose(
+        [m.values["a"] / paint.values["a"] for m in models], [450 / 550, 1.0, 650 / 550], rtol=0.02
+    )
+    with pytest.raises(PbrdfError, match="has parameters at 450, 550, 650 nm"):
+        painted_with([source], [470.0])
+    # without a wavelength it stands for one model as before
+    assert len(painted_with([source], [None])[0][1]) == 1

@@ -2,6 +2,7 @@ import json
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import pbrdf
 
@@ -139,3 +140,24 @@ def test_an_instruments_noise_differs_for_circular_polarisation(run, tmp_path):
     run("simulate", "white", "--plane", "--theta-i", "40", *arguments)
     ds = pbrdf.read(tmp_path / "i.nc")
     np.testing.assert_allclose(ds["V_std"], 5.0 * ds["Q_std"])
+
+
+def test_without_a_file_it_prints_a_table(run, tmp_path):
+    small = ("simulate", "white", "--plane", "--theta-i", "40", "--theta-r", "10,50")
+    printed = run(*small).stdout
+    assert not list(tmp_path.iterdir())
+    (tmp_path / "printed.csv").write_text(printed)
+    run(*small, "-o", "written.csv")
+    assert printed == (tmp_path / "written.csv").read_text()
+    assert pbrdf.read(tmp_path / "printed.csv").sizes["geometry"] == 2
+
+
+def test_a_grid_has_the_angles_for_dimensions(run, refused, tmp_path):
+    small = ("simulate", "white", "--theta-i", "40", "--theta-r", "10,50", "--phi", "0,90,180")
+    run(*small, "-o", "list.nc")
+    run(*small, "--grid", "-o", "grid.nc")
+    xr.testing.assert_identical(pbrdf.read(tmp_path / "grid.nc"), pbrdf.read(tmp_path / "list.nc"))
+    with xr.open_dataset(tmp_path / "grid.nc", engine="h5netcdf") as stored:
+        assert dict(stored["I"].sizes) == {"theta_i": 1, "theta_r": 2, "phi": 3}
+    assert "netCDF" in refused(*small, "--grid") and "netCDF" in refused(*small, "--grid", "-o", "g.csv")
+    assert "no grid" in refused("simulate", "white", "--plane", "--grid", "-o", "g.nc")

@@ -112,13 +112,6 @@ def test_covariances_with_v_change_sign_with_the_handedness():
     assert_allclose(c.covariance_flip_v(np.cov(samples, rowvar=False)), flipped)
 
 
-def test_scatmech_is_conjugated_with_plus_minus_minus_plus():
-    """SCATMECH, psps: Q = I_s − I_p in a right-handed frame, the same V. M12 and M34 change sign, M33 not."""
-    signs = np.diag([1, -1, -1, 1])
-    assert_allclose(c.mueller_from_scatmech(MUELLER), signs @ MUELLER @ signs)
-    assert_allclose(c.mueller_to_scatmech(c.mueller_from_scatmech(MUELLER)), MUELLER)
-
-
 @pytest.mark.parametrize("phi", AZIMUTHS)
 def test_xyxy_is_the_fixed_frame_of_the_sample(phi):
     """Light that leaves along the normal has the same xyxy vector at every φ, but its s and p turn with φ."""
@@ -166,6 +159,7 @@ def test_a_perfect_diffuser_has_reflectance_factor_one_and_brdf_one_over_pi():
         ([2, 1, 0, 0], 0.5, 0.0),
         ([2, -1, 0, 0], 0.5, np.pi / 2),
         ([2, -1, -0.0, 0], 0.5, np.pi / 2),
+        ([2, -1, -1e-17, 0], 0.5, np.pi / 2),
         ([2, 0, 2, 0], 1.0, np.pi / 4),
         ([2, 0, -2, 0], 1.0, -np.pi / 4),
         ([2, 0, 0, 2], 0.0, 0.0),

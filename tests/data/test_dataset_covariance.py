@@ -54,10 +54,10 @@ def test_stated_uncertainties_stay_and_the_others_are_filled(ds):
     assert_array_equal(stated["Q_std"], STD["Q"])
     assert_allclose(stated["U_std"], STD["U"])
     with pytest.raises(
-        DataError, match=r"rows 0, 2: the variance of Q is 0\.0001, that is 0\.01², but Q_std is 0\.02"
+        DataError, match=r"indices 0, 2: the variance of Q is 0\.0001, that is 0\.01², but Q_std is 0\.02"
     ):
         build(std={"Q": [0.02, 0.012, 0.02]})
-    with pytest.raises(DataError, match=r"row 1: the variance of Q is .* but Q_std is not stated"):
+    with pytest.raises(DataError, match=r"index 1: the variance of Q is .* but Q_std is not stated"):
         build(std={"Q": [0.01, np.nan, 0.014]})
 
 
@@ -139,7 +139,7 @@ def test_what_is_no_covariance_is_an_error_that_names_the_row(ds, row, entries, 
     issue = only_error(ds)
     assert issue.variable == "covariance"
     assert issue.rows == (row,)
-    assert f"row {row}" in issue.message
+    assert f"index {row}" in issue.message
     assert words in issue.message
 
 
@@ -158,7 +158,9 @@ def test_every_row_is_named_once_with_the_first_thing_wrong(ds):
 
 
 def test_components_without_values_have_no_covariance(ds):
-    with pytest.raises(DataError, match="rows 0, 1, 2: there is a covariance of V but no V; put NaN there"):
+    with pytest.raises(
+        DataError, match="indices 0, 1, 2: there is a covariance of V but no V; put NaN there"
+    ):
         validate(ds.drop_vars(["V", "V_std"]))
     with pytest.raises(DataError, match="Q_std is not stated"):
         validate(ds.drop_vars("Q_std"))
@@ -278,5 +280,5 @@ def test_a_strangers_netcdf_without_axes_or_uncertainties(ds, tmp_path):
     bare.to_netcdf(tmp_path / "bare.nc", engine="h5netcdf")
     assert_array_equal(read(tmp_path / "bare.nc")["covariance"], ds["covariance"])
     bare.drop_vars("U_std").to_netcdf(tmp_path / "bare.nc", engine="h5netcdf")
-    with pytest.raises(DataError, match=r"bare\.nc .* rows 0, 1, 2: .* but U_std is not stated"):
+    with pytest.raises(DataError, match=r"bare\.nc .* indices 0, 1, 2: .* but U_std is not stated"):
         read(tmp_path / "bare.nc")

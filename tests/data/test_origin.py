@@ -32,7 +32,7 @@ def test_rows_that_were_moved_have_no_lines_but_what_was_left_out_is_known(text_
     ds = read(text_file(TEXT))
     for moved in (ds.isel(geometry=[2, 1, 0]), ds.isel(geometry=[0, 1])):
         words = [str(issue) for issue in check(moved)]
-        assert any("row 1: I = 0" in w for w in words)
+        assert any("index 1: I = 0" in w for w in words)
         assert not any("line " in w for w in words)
 
 

@@ -19,7 +19,7 @@ def test_exact_copies_are_counted():
     assert found.copies.tolist() == [1, 2]
     assert found.originals.tolist() == [0, 0]
     words = [str(issue) for issue in check(ds)]
-    assert any(w.startswith("2 rows are exact copies of others (row 1 of row 0)") for w in words)
+    assert any(w.startswith("2 rows are exact copies of others (index 1 of index 0)") for w in words)
 
 
 def test_a_copy_has_all_that_was_measured_the_same():

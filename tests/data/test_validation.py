@@ -3,7 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pbrdf.data import Issue, check, make_dataset, validate
+import pbrdf
+from pbrdf.data import Issue, check, make_dataset, read, validate, write
 from pbrdf.errors import DataError
 
 
@@ -29,7 +30,7 @@ def test_zenith_angles_outside_the_hemisphere_are_errors(ds, name, value):
     ds[name][1] = value
     issue = only(check(ds))
     assert (issue.severity, issue.variable, issue.rows) == ("error", name, (1,))
-    assert "row 1" in issue.message
+    assert "index 1" in issue.message
 
 
 def test_degrees_taken_for_radians_are_recognised(ds):
@@ -176,7 +177,6 @@ def test_attributes_that_break_the_schema(ds, attrs, words):
         (lambda ds: ds.rename(geometry="row"), "no dimension 'geometry'"),
         (lambda ds: ds.isel(geometry=[]), "no rows"),
         (lambda ds: ds.drop_vars("phi"), "coordinate phi is missing"),
-        (lambda ds: ds.drop_vars("group"), "coordinate group is missing"),
         (lambda ds: ds.reset_coords("wavelength"), "must be a coordinate"),
         (lambda ds: ds.assign(DoLP=ds["Q"]), "no variable 'DoLP'"),
         (lambda ds: ds.assign(V_std=ds["Q"]), "V_std is there but V is not"),
@@ -219,10 +219,29 @@ def test_errors_come_before_warnings_and_many_rows_are_shortened():
     ds["theta_r"][:] = 1.6
     first, second = check(ds)
     assert (first.severity, second.severity) == ("error", "warning")
-    assert "rows 0, 1, 2, 3, 4 and 4 more" in str(first)
+    assert "indices 0, 1, 2, 3, 4 and 4 more" in str(first)
     assert first.rows == tuple(range(9))
 
 
 def test_assumptions_of_a_reader_are_warnings(ds):
     ds.attrs["assumptions"] = ["forward was assumed"]
     assert str(only(check(ds))) == "forward was assumed"
+
+
+def test_a_data_set_made_by_hand_needs_no_groups(tmp_path):
+    """Judged, written, described and fitted like one whose rows are all of group 0."""
+    ds = make_dataset(np.linspace(0.1, 1.2, 9), 0.4, 0.0, quantity="brdf", I=np.linspace(0.1, 0.2, 9))
+    bare = ds.drop_vars("group")
+    validate(bare)
+    assert check(bare) == check(ds)
+    for name in ("bare.csv", "bare.nc"):
+        write(bare, tmp_path / name)
+        assert (read(tmp_path / name)["group"] == 0).all()
+    result = pbrdf.fit(bare, starts=2, free=["a"])
+    assert str(result.comparison["group"].values[0]) == "0"
+    assert "group" not in bare.coords
+
+
+def test_places_in_memory_are_called_indices_and_lines_of_files_lines():
+    ds = make_dataset([0.1, 0.2], 0.2, 0.0, quantity="brdf", I=-1.0)
+    assert "indices 0, 1: " in str(check(ds)[0]) and "lines 4, 5: " in str(check(ds, lines=[4, 5])[0])

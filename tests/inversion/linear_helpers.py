@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from types import SimpleNamespace
 
@@ -12,6 +13,7 @@ from scipy.optimize import lsq_linear
 from pbrdf.backend import get_backend
 from pbrdf.inversion import refits
 from pbrdf.inversion.solver import Residuals
+from pbrdf.models.parameters import Parameter
 
 NAMES = ("x", "y", "z")
 
@@ -23,6 +25,15 @@ class PlainSpace:
     names: list[str]
     lower: np.ndarray
     upper: np.ndarray
+
+    unit: str = "1"
+
+    @property
+    def free(self):
+        return [
+            Parameter(name, name, self.unit, "", low, high, (-math.inf, math.inf), 0.0)
+            for name, low, high in zip(self.names, self.lower, self.upper, strict=True)
+        ]
 
     def to_unknowns(self, values):
         return np.array(values, dtype=float)
@@ -40,11 +51,11 @@ def design() -> np.ndarray:
     return np.column_stack([np.ones_like(s), s, s**2]) * 3.0
 
 
-def linear_fit(monkeypatch, matrix, measured, lower=-50.0, upper=50.0, std_known=True):
+def linear_fit(monkeypatch, matrix, measured, lower=-50.0, upper=50.0, std_known=True, unit="1"):
     """A fit of measured = matrix · u with unit standard uncertainties, its optimum by SciPy."""
     count, size = matrix.shape
     space = PlainSpace(
-        list(NAMES[:size]), np.broadcast_to(lower, size) * 1.0, np.broadcast_to(upper, size) * 1.0
+        list(NAMES[:size]), np.broadcast_to(lower, size) * 1.0, np.broadcast_to(upper, size) * 1.0, unit
     )
 
     def residuals(space, data, starts=1):

@@ -183,7 +183,7 @@ def test_a_singular_covariance_is_refused_with_its_row(one):
     ds["covariance"][5, :3, :3] = np.outer(std, std)
     pbrdf.validate(ds)
     with pytest.raises(
-        FitError, match=r"covariance of row 5 is singular, as if some combination of I, Q, U were"
+        FitError, match=r"covariance at index 5 is singular, as if some combination of I, Q, U were"
     ):
         pbrdf.fit(ds)
     ds["Q"][5] = ds["U"][5] = np.nan

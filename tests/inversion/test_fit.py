@@ -236,6 +236,24 @@ def test_a_parameter_driven_to_its_bound_is_reported_there():
     assert any(note.startswith("n stands at upper bound (1.5)") for note in result.notes)
 
 
+@pytest.mark.slow
+def test_errors_beside_an_active_bound_are_those_of_a_fit_with_that_parameter_fixed():
+    """Held by its bound, a parameter takes no part: errors as if it were free, lmfit's and SciPy's, are too large."""
+    model = pbrdf.load_paint("cd-back")
+    dataset = simulated(model, in_plane([30, 45], np.arange(-40, 70, 4)))
+    bounded = pbrdf.fit(dataset, starts=8, bounds={"n": (1.2, 1.5)})
+    fixed = pbrdf.fit(dataset, starts=8, fix={"n": 1.5})
+    others = [name for name in FREE if name != "n"]
+    assert np.isnan(bounded.estimates["n"].std)
+    for name in others:
+        assert bounded.estimates[name].value == pytest.approx(fixed.estimates[name].value, rel=1e-6)
+        assert bounded.estimates[name].std == pytest.approx(fixed.estimates[name].std, rel=1e-5), name
+    as_if_free = np.sqrt(np.diag(np.linalg.inv(bounded.information)))
+    inside = [i for i, name in enumerate(bounded.space.names) if name != "n"]
+    held = np.sqrt(np.diag(np.linalg.inv(bounded.information[np.ix_(inside, inside)])))
+    assert (as_if_free[inside] / held).max() > 1.1
+
+
 def test_fixed_parameters_stay_and_starts_begin_where_told():
     dataset = pbrdf.open_experiment("cd-back")
     result = pbrdf.fit(dataset, fix={"n": 1.742}, start={"t": 0.3}, starts=8)
@@ -344,6 +362,15 @@ def test_compare_gives_the_dolp_of_unpolarised_and_polarised_data():
 def test_what_cannot_be_fitted_is_said_clearly(arguments, message):
     with pytest.raises(pbrdf.PbrdfError, match="(?s)" + message.replace("(", r"\(")):
         pbrdf.fit(pbrdf.open_experiment("cd-back"), **arguments)
+
+
+def test_a_held_out_fraction_may_be_given_in_per_cent():
+    dataset = pbrdf.open_experiment("matte-white-thick")
+    by_share, by_per_cent = (
+        pbrdf.HoldOut.parse(text).mask(dataset) for text in ("fraction=0.25", "fraction=25%")
+    )
+    assert by_share.sum() > 0
+    np.testing.assert_array_equal(by_share, by_per_cent)
 
 
 def test_too_few_values_are_refused():

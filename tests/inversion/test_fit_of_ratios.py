@@ -12,7 +12,7 @@ import pbrdf
 from pbrdf.data.conventions import dolp_aolp_from_stokes
 from pbrdf.errors import FitError
 from pbrdf.inversion.noise import EqualNoise, InstrumentNoise, NoiseModel
-from pbrdf.inversion.observations import Observations
+from pbrdf.inversion.observations import Observations, noise_in_words
 from pbrdf.inversion.problem import derivatives, predict
 from pbrdf.inversion.unknowns import space_of, with_terms
 
@@ -272,3 +272,24 @@ def test_a_dark_model_has_ratios_of_zero_with_finite_derivatives():
 def test_a_gain_of_ratios_alone_is_refused(paint, directions):
     with pytest.raises(FitError, match="only ratios were measured"):
         pbrdf.fit(simulated(paint, directions, "stokes", 0), paint, nuisances=["gain"])
+
+
+@pytest.mark.parametrize(
+    ("noise", "words"),
+    [
+        (NoiseModel(0.03, 0.04), "stated: 0.05 for every ratio"),
+        (
+            InstrumentNoise(0.01, 0.05, read=2.0),
+            "stated: instrument: 0.01 for linear and 0.05 for circular ratios",
+        ),
+        (EqualNoise(), "stated: equal weights"),
+        (None, "uncertainty: 0.071 for every ratio"),
+    ],
+)
+def test_the_noise_of_ratios_alone_is_not_told_of_an_intensity(noise, words):
+    ds = pbrdf.make_dataset(0.5, [0.4, 0.5], 0.0, dolp=[0.1, 0.2])
+    said = noise_in_words(noise, Observations.from_dataset(ds, noise))
+    assert said.endswith(words) and "intensity" not in said
+    bright = pbrdf.make_dataset(0.5, [0.4, 0.5], 0.0, quantity="brdf", dolp=[0.1, 0.2], I=1.0)
+    if isinstance(noise, NoiseModel | InstrumentNoise):
+        assert "of the intensity" in noise_in_words(noise, Observations.from_dataset(bright, noise))

@@ -37,6 +37,19 @@ def test_an_unknown_without_influence_is_named_alone(monkeypatch):
     assert np.isnan(found.parameters["inflation"].sel(parameter="y"))
 
 
+def test_angles_are_told_in_degrees(monkeypatch):
+    """The tables that stand above these sentences have them in degrees."""
+    matrix = design() * [1e3, 0.0, 1e3]
+    bounds = np.deg2rad([-2.0, 2.0])
+    result = linear_fit(monkeypatch, matrix, matrix @ [0.01, 0.0, 0.02], *bounds, unit="rad")
+    (sentence,) = identifiability(result, described=True).sentences
+    assert "y: moving it anywhere between -2° and 2° changes" in sentence
+    matrix = matrix[:, [0, 0, 2]]
+    result = linear_fit(monkeypatch, matrix, matrix @ [0.01, 0.0, 0.02], *bounds, unit="rad")
+    sentence = identifiability(result, described=True).sentences[0]
+    assert sentence.count("°") == 4 and " to 2.0°" in sentence, sentence
+
+
 def test_variance_inflation_is_that_of_regression(monkeypatch):
     """1/(1 − R²) of each column regressed on the others (uncentred), and both standard errors."""
     matrix = design()

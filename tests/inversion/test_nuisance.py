@@ -11,6 +11,7 @@ import pbrdf
 from pbrdf.errors import FitError
 from pbrdf.inversion.nuisance import Nuisance
 from pbrdf.inversion.observations import Observations
+from pbrdf.inversion.plausibility import plausibility
 from pbrdf.inversion.problem import Space, Term, predict
 
 MODEL = pbrdf.DoubleGauss(0.05, 1.6, 0.6, 1.2, 0.2, 0.6)
@@ -265,3 +266,16 @@ def test_angle_offsets_need_data_in_plane():
     ds = pbrdf.make_dataset(0.3, 0.2, np.linspace(0.2, 2.0, 8), quantity="brdf", I=stokes[:, 0])
     with pytest.raises(FitError, match="plane of incidence"):
         pbrdf.fit(ds, nuisances=["angle"])
+
+
+def test_an_angle_on_its_bound_is_told_in_degrees():
+    """As in the table above the notes."""
+    theta_i, theta_r, group = protocol()
+    stokes = MODEL.stokes(*as_angles(theta_i + 3.0, theta_r - 3.0))
+    held = {name: value for name, value in MODEL.values.items() if name != "a"}
+    ds = dataset(stokes, theta_i, theta_r, group)
+    result = pbrdf.fit(ds, nuisances=["angle~none"], fix=held, starts=2)
+    (note,) = [note for note in result.notes if note.startswith("angle stands")]
+    assert "at upper bound (2°)" in note
+    findings = [f.sentence for f in plausibility(result, ds) if f.sentence.startswith("angle")]
+    assert findings and findings[0].startswith("angle = 2° stands at upper bound")

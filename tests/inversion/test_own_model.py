@@ -49,6 +49,19 @@ def test_a_joint_fit_finds_the_parameters_and_predicts(result):
     assert result.goodness.reduced_chi2 == pytest.approx(1.0, abs=0.4)
 
 
+@pytest.mark.slow
+def test_a_parameter_that_the_data_do_not_see_has_no_standard_error():
+    """Q and U of facets do not see a Lambertian body at all: its error is none, not 0 as ``curve_fit`` has it."""
+    dataset = dataset_of(TRUTH)
+    dataset["I"][:] = np.nan
+    found = pbrdf.fit(dataset, LambertGGX, starts=8)
+    albedo = found.estimates["rho"]
+    assert albedo.verdict == "undetermined" and np.isnan(albedo.std)
+    assert found.information[found.space.names.index("rho")] == pytest.approx(0.0, abs=0.0)
+    for name in ("alpha", "index"):
+        assert found.estimates[name].verdict == "determined" and found.estimates[name].std > 0.0
+
+
 def test_the_stepwise_strategy_takes_the_parts_from_the_declaration():
     result = pbrdf.fit(dataset_of(TRUTH), LambertGGX, starts=8, strategy="stepwise")
     within(result)

@@ -101,6 +101,25 @@ def test_an_optimum_on_a_bound_gives_one_sided_intervals(monkeypatch, measured):
     assert found.intervals["y"].lower == lower[1] and found.intervals["y"].lower_at_bound
 
 
+def test_beside_a_bound_that_the_data_pull_at_intervals_are_those_with_that_parameter_fixed(
+    monkeypatch, measured
+):
+    """The data want y thirty errors below its bound: x and z are as in the problem where y is known to be there."""
+    free = linear_fit(monkeypatch, design(), measured)
+    held = free.unknowns[1] + 30.0 * np.sqrt(np.linalg.inv(free.information)[1, 1])
+    inside = [0, 2]
+    fixed = linear_fit(monkeypatch, design()[:, inside], measured - design()[:, 1] * held)
+    error = np.sqrt(np.diag(np.linalg.inv(fixed.information)))
+    bounded = linear_fit(monkeypatch, design(), measured, lower=np.array([-50.0, held, -50.0]))
+    found = profile(bounded, ["x", "z"])
+    for name, value, std in zip("xz", fixed.unknowns, error, strict=True):
+        interval, z = found.intervals[name], stats.norm.ppf(0.975)
+        assert abs(interval.lower - (value - z * std)) < 2e-3 * std
+        assert abs(interval.upper - (value + z * std)) < 2e-3 * std
+    as_if_free = np.sqrt(np.diag(np.linalg.inv(free.information)))[inside]
+    assert (as_if_free / error).min() > 1.5
+
+
 def test_a_curved_problem_gives_an_asymmetric_interval(monkeypatch, measured):
     """r = eᵘ − 3: the ends are ln(3 ± 1.96) in closed form, the lower one four times as far away."""
     result = linear_fit(monkeypatch, design()[:, :1], measured)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from types import SimpleNamespace
 
 import numpy as np
@@ -145,6 +146,16 @@ def test_a_model_no_better_than_a_constant_explains_nothing():
     assert next(s.error for s in found.strata) < 0.5  # it is not the size of the error
     half = lambda t: 0.5 * constant(t)  # noqa: E731
     assert verdict(case(half)).level == Level.IN_PART
+
+
+def test_a_model_that_is_black_somewhere_is_judged_without_a_warning():
+    """A Beckmann lobe underflows far from the mirror direction; no one is told of 0/0."""
+    black = case(q=0.3)
+    black.comparison["I_modelled"].values[black.comparison["theta_i"].values > 1.0] = 0.0
+    black.comparison["Q_modelled"].values[black.comparison["theta_i"].values > 1.0] = 0.0
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert verdict(black).level != Level.DESCRIBES
 
 
 def test_polarisation_of_the_wrong_sign_is_not_described():

@@ -90,6 +90,19 @@ def test_elements_are_realisable(angle, d, delta):
         assert coherency_eigenvalues(M).min() > -1e-13
 
 
+def test_cloude_of_exact_retarders_depolarisers_and_free_space():
+    """Finite where Lu-Chipman's factors are not (katsu): one component or four; transmittance is but a factor."""
+    plate = retarder(0.3, np.pi / 2)
+    for M, expected in (
+        (np.eye(4), [0, 0, 0, 1]),
+        (plate, [0, 0, 0, 1]),
+        (0.5 * plate, [0, 0, 0, 0.5]),
+        (np.diag([1.0, 0, 0, 0]), [0.25, 0.25, 0.25, 0.25]),
+        (0.2 * np.diag([1.0, -1, -1, 1]), [0, 0, 0, 0.2]),
+    ):
+        np.testing.assert_allclose(coherency_eigenvalues(M), expected, atol=1e-15)
+
+
 def test_polariser_passes_what_is_along_its_axis():
     """Light polarised along the transmission axis passes whole, light across it not at all."""
     psi = np.deg2rad([0.0, 30.0, 45.0, 90.0, 135.0])

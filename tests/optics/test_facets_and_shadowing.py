@@ -176,3 +176,17 @@ def test_white_furnace_diverges_without_shadowing(jit):
 def test_smith_conserves_energy(jit):
     for degrees in (0, 35, 60, 75, 80, 85):
         assert furnace(jit, degrees, 0.3, "smith") <= 1 + 1e-6
+
+
+@pytest.mark.parametrize(("degrees", "upward"), [(0, 0.996), (60, 0.934), (85, 0.983)])
+def test_v_cavities_lose_what_goes_below_the_horizon(degrees, upward):
+    """The facets that the source sees cover the surface exactly, but some of them mirror its light downwards."""
+    m, w = polar_facets(0.3, 400)
+    source = np.array([-np.sin(np.radians(degrees)), 0.0, np.cos(np.radians(degrees))])
+    cos_beta = m @ source
+    seen = np.maximum(cos_beta, 0.0)
+    masking = np.minimum(1.0, 2.0 * m[:, 2] * source[2] / np.maximum(seen, 1e-12))
+    share = masking * seen / (m[:, 2] * source[2]) * w
+    assert share.sum() == pytest.approx(1.0, abs=2e-4)
+    mirrored = 2.0 * cos_beta[:, None] * m - source
+    assert share[mirrored[:, 2] > 0.0].sum() == pytest.approx(upward, abs=1e-3)

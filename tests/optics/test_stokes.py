@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
+import pbrdf
 from pbrdf.backend import get_backend
+from pbrdf.data.conventions import dolp_aolp_from_stokes
 from pbrdf.optics.stokes import aolp, docp, dolp, dop
 
 S = np.array([[2.0, 0.6, 0.8, 0.0], [1.0, -1.0, 0.0, 0.0], [4.0, 0.0, 0.0, -2.0], [1.0, 0.0, 0.5, 0.5]])
@@ -15,6 +17,7 @@ EXPECTED = {
     docp: [0.0, 0.0, 0.5, 0.5],
     dop: [0.5, 1.0, 0.5, np.sqrt(0.5)],
     aolp: [0.5 * np.arctan2(0.8, 0.6), np.pi / 2, 0.0, np.pi / 4],
+    pbrdf.ellipticity: [0.0, 0.0, -np.pi / 4, np.pi / 8],
 }
 
 
@@ -40,6 +43,27 @@ def test_drjit(function):
     np.testing.assert_allclose(function(module.Array4f64(*S.T)).numpy(), EXPECTED[function], atol=1e-15)
 
 
+def test_ellipticity_is_that_of_the_polarised_part():
+    """Natural light added and the frame turned change nothing; an ellipse is found again (pypolar: asin(V/I)/2)."""
+    angles = np.linspace(-np.pi / 4, np.pi / 4, 9)
+    for share in (1.0, 0.3, 1e-3):
+        for axis in (0.0, 0.4, np.pi / 4, -1.2):
+            flat = share * np.cos(2 * angles)
+            stokes = np.stack(
+                [
+                    0 * angles + 1,
+                    flat * np.cos(2 * axis),
+                    flat * np.sin(2 * axis),
+                    share * np.sin(2 * angles),
+                ],
+                -1,
+            )
+            np.testing.assert_allclose(pbrdf.ellipticity(stokes), angles, atol=1e-14)
+    assert pbrdf.ellipticity([1.0, 0.0, 0.0, 0.3]) == np.pi / 4
+    assert np.tan(pbrdf.ellipticity([1.0, 0.6, 0.0, 0.8])) == pytest.approx(0.5)
+    assert np.tan(pbrdf.ellipticity([1.0, 0.0, 0.6, 0.8])) == pytest.approx(0.5)
+
+
 @pytest.mark.parametrize("function", [dolp, docp, dop])
 def test_invariance(function):
     """Brightness does not matter; turning the frame changes no degree of polarisation."""
@@ -54,3 +78,12 @@ def test_invariance(function):
 def test_no_light_is_nan_without_a_warning(function):
     """Where I = 0 there is no light and the result is NaN (module docstring)."""
     assert np.isnan(function(np.zeros((2, 4)))).all()
+
+
+@pytest.mark.parametrize("u", [0.0, -0.0, 1e-17, -1e-17, -1e-300])
+def test_light_along_s_is_at_plus_90_degrees_whatever_the_sign_of_a_u_that_is_zero(u):
+    stokes = [1.0, -1.0, u, 0.0]
+    assert aolp(stokes) == np.pi / 2
+    assert dolp_aolp_from_stokes(stokes)[1] == np.pi / 2
+    assert aolp(xr.DataArray(stokes, dims="stokes_out")).item() == np.pi / 2
+    assert aolp(get_backend().module.Array4f64(*stokes)).numpy()[0] == np.pi / 2

@@ -181,3 +181,10 @@ def test_numbers_out_of_range_are_refused(mitsuba, numbers):
 def test_a_variant_without_polarisation_is_refused(mitsuba, variant):
     with pytest.raises(BackendError, match="llvm_ad_mono_polarized"):
         start_mitsuba(variant)
+
+
+def test_pixels_of_surfaces_are_told_from_those_of_the_sky(mitsuba):
+    """A sphere on a ground of finite size: the upper edge of the picture is sky, the middle is not."""
+    picture = render_stokes(make_scene(subject("sphere", [COAT]), "sky", (24, 24)), spp=4, depth=2)
+    assert picture.surface.shape == picture.shape
+    assert not picture.surface[0].any() and picture.surface[12:].all()

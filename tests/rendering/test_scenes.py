@@ -49,8 +49,8 @@ def test_every_scene_is_lit_by_every_light(mitsuba, environment, name, light):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("count", [1, 3])
-def test_the_car_is_painted_piece_by_piece(mitsuba, count):
-    what = subject("car", [{**COAT, "alpha": 0.05 * (i + 1)} for i in range(count)], 1.5)
+def test_the_fender_is_painted_piece_by_piece(mitsuba, count):
+    what = subject("fender", [{**COAT, "alpha": 0.05 * (i + 1)} for i in range(count)], 1.5)
     assert sorted(name for name in what.entries if name.startswith("body")) == [
         f"body{i + 1}" for i in range(count)
     ]
@@ -71,7 +71,7 @@ def test_models_stand_side_by_side_from_left_to_right(mitsuba):
 @pytest.mark.parametrize("name", ["sphere", "plate"])
 @pytest.mark.parametrize("aspect", [0.6, 1.0, 2.0])
 def test_what_is_painted_fits_into_the_picture(mitsuba, name, aspect):
-    """Black paint on all objects of the row: none is cut off by the picture's edge (the car is, on purpose)."""
+    """Black paint on all objects of the row: none is cut off by the picture's edge (the fender is, on purpose)."""
     coats = [{"type": "diffuse", "reflectance": {"type": "uniform", "value": 0.0}}] * 2
     size = (round(60 * aspect), 60) if aspect < 1.0 else (60, round(60 / aspect))
     what = subject(name, coats, aspect)
@@ -133,7 +133,7 @@ def test_an_environment_map_of_another_kind_is_refused(mitsuba, tmp_path):
 
 
 def test_unknown_scenes_and_too_many_models_are_refused(mitsuba):
-    with pytest.raises(PbrdfError, match="choose sphere, plate, car"):
+    with pytest.raises(PbrdfError, match="choose sphere, plate, fender"):
         subject("teapot", [COAT])
     with pytest.raises(PbrdfError, match="1 to 12 models, not 13"):
         subject("sphere", [COAT] * 13)

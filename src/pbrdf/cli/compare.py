@@ -10,6 +10,7 @@ import typer
 from pbrdf.cli.command_line import command_line
 from pbrdf.cli.console import NOT_CONVERGED, output_console, stage_bar
 from pbrdf.cli.fit_options import Objective
+from pbrdf.cli.folders import ready_folder, say_written
 from pbrdf.cli.options import (
     Backend,
     data_argument,
@@ -95,7 +96,6 @@ def compare(
 
     With your own: `pbrdf compare paint.csv --wavelength 550 --hold-out theta_i=50`
     """
-    from pbrdf.files.atomic import require_writable_folder
     from pbrdf.files.digest import sha256_of
     from pbrdf.report.comparison.folder import write_comparison
     from pbrdf.report.style import FIGURE_FORMATS, leave_out_help_texts
@@ -108,7 +108,7 @@ def compare(
     if names == []:
         raise PbrdfError("--models: name at least one, for example --models double-gauss")
     folder = output or Path(f"{Path(file).stem}-compare")
-    require_writable_folder(folder)
+    stood = ready_folder(folder)
     if backend is not None:
         from pbrdf.backend import set_backend
 
@@ -146,6 +146,6 @@ def compare(
         console = output_console()
         print_summary(report, console)
         print_columns(dataset, file)
-        console.print(f"\nWritten to {folder}/: {', '.join(path.name for path in written)}", markup=False)
+        say_written(folder, written, stood)
     if not comparison.best.result.settled:
         raise typer.Exit(NOT_CONVERGED)

@@ -28,6 +28,7 @@ from pbrdf.cli.fit_options import (
     fit_arguments,
     fitted_model,
 )
+from pbrdf.cli.folders import ready_folder, say_written
 from pbrdf.cli.options import (
     Backend,
     output_option,
@@ -146,7 +147,6 @@ def fit(
 
     With your own: `pbrdf fit paint.csv --column I=f_r_per_sr --noise 3%,1% --fix n=1.5`
     """
-    from pbrdf.files.atomic import require_writable_folder
     from pbrdf.files.digest import sha256_of
     from pbrdf.report.fit.checks import run_checks
     from pbrdf.report.fit.folder import parse_formats, write_report
@@ -177,8 +177,7 @@ def fit(
     }
     pairs_drawn = [_pair(text) for text in contour or ()]
     folders = _folders(files, output)
-    for folder in folders:
-        require_writable_folder(folder)
+    stood = [ready_folder(folder) for folder in folders]
     if backend is not None:
         from pbrdf.backend import set_backend
 
@@ -188,7 +187,7 @@ def fit(
     from pbrdf.inversion import fit as fit_dataset
 
     unsettled = False
-    for file, folder in zip(files, folders, strict=True):
+    for file, folder, earlier in zip(files, folders, stood, strict=True):
         dataset = reading.open(file)
         require_choice(dataset, reading, file, by_wavelength="wavelength" in arguments["split"].values())
         try:
@@ -226,7 +225,7 @@ def fit(
 
         console = output_console()
         print_summary(report, console, verbose=verbose)
-        console.print(f"\nWritten to {folder}/: {', '.join(path.name for path in written)}", markup=False)
+        say_written(folder, written, earlier)
     if unsettled:
         raise typer.Exit(NOT_CONVERGED)
 

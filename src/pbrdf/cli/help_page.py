@@ -43,7 +43,17 @@ _RUN = "How it runs"
 #: The commands of the program by what they are for, in the order of its help.
 GROUPS: dict[str, tuple[str, ...]] = {
     "To begin with": ("demo", "example", "doctor", "paints", "models"),
-    "From data to models": ("check", "fit", "compare", "plot", "explore", "simulate", "map", "convert"),
+    "From data to models": (
+        "check",
+        "fit",
+        "compare",
+        "plot",
+        "explore",
+        "simulate",
+        "map",
+        "convert",
+        "compare-with",
+    ),
     "Which material it is": ("identify", "library"),
     "Instruments and measurements": ("reduce", "calibrate", "polarimeter", "plan", "measure"),
     "Pictures": ("render", "export"),

@@ -12,6 +12,7 @@ import typer
 
 from pbrdf.cli.command_line import command_line
 from pbrdf.cli.console import output_console, progress_bar, warn
+from pbrdf.cli.folders import say_written, standing
 from pbrdf.cli.labels import read_labelled, read_pixel_labels
 from pbrdf.cli.options import (
     Backend,
@@ -304,12 +305,14 @@ def _one(request: _Request, source: str, folder: Path | None) -> None:
         following,
         fitted,
     )
+    stood = frozenset() if folder is None else standing(folder)
     written = [] if folder is None else write_identification(report, folder, figure_format=request.drawn)
     if request.quiet:
         print(f"{source}: {', '.join(found.materials) or 'none of these'}")
         return
     print_summary(report, output_console())
-    _say_written(folder, written)
+    if folder is not None:
+        say_written(folder, written, stood)
 
 
 def _next(source: str, found: Identification) -> NextMeasurement | None:
@@ -376,12 +379,14 @@ def _every_pixel(request: _Request, source: str, pixels: xr.Dataset, folder: Pat
         judged,
         "" if given_labels is None else str(given_labels),
     )
+    stood = frozenset() if folder is None else standing(folder)
     written = [] if folder is None else write_classes(report, folder, figure_format=request.drawn)
     if request.quiet:
         print(folder if folder is not None else f"{source}: {_largest(report)}")
         return
     print_classes(report, output_console())
-    _say_written(folder, written)
+    if folder is not None:
+        say_written(folder, written, stood)
     if folder is None:
         warn(f"{source}: the map of materials is not kept; --output FOLDER writes it")
 
@@ -423,6 +428,7 @@ def _calibrate(request: _Request, table: Path, file: Path | None, output: Path |
     at = request.confidence
     judged = table_of(library.names, truth, probability, p_value > 1.0 - at, at)
     report = Calibrated(made, judged, str(table), str(target), request.settings, command_line())
+    stood = standing(folder)
     written = write_calibration(report, folder, figure_format=request.drawn, with_library=within)
     if not within:
         made.write(target)
@@ -430,7 +436,7 @@ def _calibrate(request: _Request, table: Path, file: Path | None, output: Path |
         print(target)
         return
     print_calibration(report, output_console())
-    _say_written(folder, written)
+    say_written(folder, written, stood)
     output_console().print(
         f"The calibration is in {target}: `pbrdf identify DATA --library {target}` uses it.", markup=False
     )
@@ -463,12 +469,14 @@ def _judge(request: _Request, table: Path, folder: Path | None) -> None:
     report = LabelledReport(
         found, str(table), request.library, request.name, request.prior, request.settings, command_line()
     )
+    stood = frozenset() if folder is None else standing(folder)
     written = [] if folder is None else write_labelled(report, folder, figure_format=request.drawn)
     if request.quiet:
         print(folder if folder is not None else f"{table}: {confusion_sentence(found, 'measurements')}")
         return
     print_labelled(report, output_console())
-    _say_written(folder, written)
+    if folder is not None:
+        say_written(folder, written, stood)
 
 
 def _told(source: str, work: Callable[[], Any]) -> Any:
@@ -503,9 +511,3 @@ def _folders(sources: list[str], output: Path | None) -> list[Path]:
                 f"two data sets are called {stem!r}: identify them one after the other, with --output"
             )
     return [output] if len(sources) <= 1 else [output / stem for stem in stems]
-
-
-def _say_written(folder: Path | None, written: list[Path]) -> None:
-    if folder is not None:
-        names = ", ".join(path.name for path in written)
-        output_console().print(f"\nWritten to {folder}/: {names}", markup=False)

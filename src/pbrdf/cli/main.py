@@ -56,6 +56,7 @@ COMMANDS = {
     "convert": "convert",
     "demo": "demo",
     "example": "example",
+    "compare-with": "compare_with:compare_with",
     "paints": "lists",
     "models": "lists",
     "doctor": "doctor",

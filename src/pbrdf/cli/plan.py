@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from pbrdf.cli.console import output_console, progress_bar
+from pbrdf.cli.folders import ready_folder
 from pbrdf.cli.instruments import open_instrument
 from pbrdf.cli.options import (
     Backend,
@@ -32,7 +33,9 @@ def plan(
     ],
     output: Annotated[
         Path,
-        output_option("The angle table to write; a picture of the same name goes beside it."),
+        output_option(
+            "The angle table to write, with a picture beside it; or a folder for plan.csv and plan.png."
+        ),
     ] = Path("plan.csv"),
     budget: Annotated[int, typer.Option(help="Number of readings.", min=1)] = 63,
     criterion: Annotated[
@@ -122,10 +125,14 @@ def plan(
 
     if noise is not None and instrument is not None:
         raise PbrdfError("--noise and --instrument exclude each other: choose one")
-    if output.suffix.lower() != ".csv":
-        raise PbrdfError(f"--output {output}: the extension must be .csv")
+    into = not output.suffix or (output.is_dir() and output.suffix.lower() != ".csv")
+    if into:
+        ready_folder(output)
+        output /= "plan.csv"
+    elif output.suffix.lower() != ".csv":
+        raise PbrdfError(f"--output {output}: the extension must be .csv; or give a folder")
     picture = output.with_suffix(".png")
-    for file in (output, picture):
+    for file in (output, picture) if not into else ():
         require_folder_of(file)
     if backend is not None:
         set_backend(backend)
@@ -156,6 +163,8 @@ def plan(
             seed=seed,
             progress=progress,
         )
+    if into:
+        output.parent.mkdir(parents=True, exist_ok=True)
     save_figure(plan_figure(made, Path(source).name), picture)
     mounted = 0.0 if isinstance(taken, str) else taken.reference_angle
     write_angles(made.protocol.angle_table(reference_angle=mounted), output)

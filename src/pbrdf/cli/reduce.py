@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from pbrdf.cli.console import output_console, progress_bar, warn
+from pbrdf.cli.folders import ready_folder, say_written
 from pbrdf.cli.instruments import open_instrument
 from pbrdf.cli.options import (
     DarkLevel,
@@ -127,9 +128,11 @@ def reduce(
         )
         return
     if polarimeter is None:
+        from pbrdf.instruments.polarimeter.presets import PRESETS
+
         raise PbrdfError(
-            "--polarimeter: say what took the frames: the TOML file of the instrument, or a built-in one "
-            "(docs/instruments.md)"
+            "--polarimeter: say what took the frames: the TOML file of the instrument (docs/instruments.md), or a "
+            f"built-in one: {', '.join(PRESETS)}"
         )
     instrument = open_instrument(polarimeter, mueller=True, colors=True)
     if instrument.generator is not None:
@@ -158,7 +161,7 @@ def reduce(
             f"--roi sample=0:{found.columns},0:{found.rows} for all of it"
         )
     plain = frames.resolve()
-    folder = _folder(frames, output)
+    folder, stood = _folder(frames, output)
     wanted = Wanted(None if maps == "none" else maps, pictures, chosen, table, f".{datasets}")
     with progress_bar(f"Reducing {frames}", quiet) as progress:
         result = write_reduction(
@@ -187,13 +190,11 @@ def reduce(
     )
     shown = {name: means for name, means in result.averages.items() if name in chosen} or result.averages
     print_averages(shown, found.names, console)
-    console.print(f"\nWritten to {folder}/: {', '.join(path.name for path in result.files)}", markup=False)
+    say_written(folder, result.files, stood)
 
 
-def _folder(frames: Path, output: Path | None) -> Path:
-    """Where the results go, checked to be writable and not to be where the frames are."""
-    from pbrdf.files.atomic import require_writable_folder
-
+def _folder(frames: Path, output: Path | None) -> tuple[Path, frozenset[str]]:
+    """Where the results go, checked to be writable and not to be where the frames are; and what stands there."""
     plain = frames.resolve()
     folder = output or Path(
         f"{plain.name if plain.is_dir() and plain.suffix != '.zarr' else plain.stem}-reduced"
@@ -202,8 +203,7 @@ def _folder(frames: Path, output: Path | None) -> Path:
         raise PbrdfError(
             f"--output {folder}: the frames are in this folder; choose another one for the results"
         )
-    require_writable_folder(folder)
-    return folder
+    return folder, ready_folder(folder)
 
 
 def _reduce_mueller(
@@ -252,7 +252,7 @@ def _reduce_mueller(
         with progress_bar(f"Reducing {frames}", quiet) as progress:
             found = mueller_of_frames(opened, instrument, chosen, max_memory=memory, progress=progress)
         notes = notes_of(opened)
-    folder = _folder(frames, output)
+    folder, stood = _folder(frames, output)
     files = write_mueller(
         found, instrument, folder, angles=table, suffix=f".{datasets}", name=frames.resolve().name
     )
@@ -263,7 +263,7 @@ def _reduce_mueller(
         return
     console = output_console()
     print_mueller(found, console)
-    console.print(f"\nWritten to {folder}/: {', '.join(path.name for path in files)}", markup=False)
+    say_written(folder, files, stood)
 
 
 def _reduce_pictures(
@@ -295,13 +295,13 @@ def _reduce_pictures(
             "all of it"
         )
     chosen = regions or {WHOLE_PICTURE: Rectangle(0, columns, 0, rows)}
+    folder, stood = _folder(path, output)
     result = write_picture_reduction(
-        series, chosen, _folder(path, output), angles=table, suffix=f".{datasets}", name=path.name
+        series, chosen, folder, angles=table, suffix=f".{datasets}", name=path.name
     )
     if quiet:
-        print(result.files[0].parent)
+        print(folder)
         return
     console = output_console()
     print_averages(result.averages, series.names, console)
-    files = ", ".join(file.name for file in result.files)
-    console.print(f"\nWritten to {result.files[0].parent}/: {files}", markup=False)
+    say_written(folder, result.files, stood)

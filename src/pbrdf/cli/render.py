@@ -13,7 +13,7 @@ import typer
 
 from pbrdf.cli.console import progress_bar, warn
 from pbrdf.cli.options import NoProgressBar, model_argument, output_option, seed_option
-from pbrdf.cli.values import require_folder_of
+from pbrdf.cli.values import number, require_folder_of
 from pbrdf.errors import PbrdfError
 
 if TYPE_CHECKING:
@@ -29,10 +29,20 @@ def render(
     models: Annotated[
         list[str] | None,
         model_argument(
-            "Models' JSON files, folders of fits, or bundled paints: one object each (on the car: one piece)."
+            "Models' JSON files, folders of fits, or bundled paints: one object each (on the fender: one piece)."
         ),
     ] = None,
-    scene: Annotated[str, typer.Option(help="sphere, plate, car, or a Mitsuba scene FILE.xml.")] = "sphere",
+    scene: Annotated[
+        str, typer.Option(help="sphere, plate, fender, or a Mitsuba scene FILE.xml.")
+    ] = "sphere",
+    wavelength: Annotated[
+        str | None,
+        typer.Option(
+            help="One in nm, or three for a picture in colour: each object then takes a model for each, in this order, "
+            "or one fit with parameters of each wavelength.",
+            metavar="NM[,NM,NM]",
+        ),
+    ] = None,
     albedo: Annotated[
         float | None,
         typer.Option(
@@ -97,8 +107,10 @@ def render(
     A fit to a camera's counts: `pbrdf render paint-fit --albedo 0.6`
 
     Two paints, seen through a polariser: `pbrdf render white-scene pearl-white-scene --scene plate --polarizer 90`
+
+    In colour: `pbrdf render blue.json green.json red.json --wavelength 450,550,650`
     """
-    from pbrdf.cli.sources import open_model
+    from pbrdf.cli.wavelengths import painted_with
     from pbrdf.files.atomic import require_writable_folder
 
     sources = models or []
@@ -126,18 +138,25 @@ def render(
     for angle in polarizer or ():
         if not math.isfinite(angle):
             raise PbrdfError("--polarizer: give an angle in degrees")
+    colours = _wavelengths(wavelength)
     target = output or Path(f"{Path(scene).stem}-render")
-    if target.suffix.lower() == ".exr":
-        require_folder_of(target)
-    else:
+    if target.suffix.lower() != ".exr":
         require_writable_folder(target)
-    paints = [open_model(source) for source in sources]
+    elif len(colours) > 1:
+        raise PbrdfError(f"--output {target}: a picture in colour is several files; give a folder")
+    else:
+        require_folder_of(target)
+    # of each object, and in that of each wavelength
+    painted = painted_with(sources, colours)
     if albedo is not None:
         from pbrdf.models.reflectance import with_albedo
 
-        paints = [with_albedo(model, albedo) for model in paints]
-    for source, model in zip(sources, paints, strict=True):
-        _warn_of_gain(source, model)
+        if len(colours) > 1:
+            raise PbrdfError("--albedo would make every colour alike: leave it or --wavelength out")
+        painted = [(source, [with_albedo(model, albedo) for model in given]) for source, given in painted]
+    for source, models_of_one in painted:
+        for model in models_of_one:
+            _warn_of_gain(source, model)
 
     from pbrdf.rendering import bsdf_dict
     from pbrdf.rendering.render import render_stokes
@@ -147,20 +166,28 @@ def render(
     mitsuba = start_mitsuba(variant)
     # what it warns of (a film's format, say) is settled by this command
     mitsuba.set_log_level(mitsuba.LogLevel.Error)
-    coats = [bsdf_dict(model) for model in paints]
-    if own:
-        stage = _stage(
-            scene, coats, lamp, shape or (512, 512), sun_zenith, sun_azimuth, max_dolp, optical_depth
-        )
-    else:
-        stage = load_scene_file(Path(scene), coats, shape)
-    with progress_bar(f"Rendering {scene}", quiet) as progress:
-        picture = render_stokes(stage, spp=spp, depth=depth, seed=seed, progress=progress)
     title = ", ".join(Path(source).name for source in sources) or Path(scene).name
     notes = {"models": title, "scene": scene, "light": lamp if own else "of the scene", "variant": variant}
-    picture = replace(picture, attrs={**picture.attrs, **notes})
-    written = _write(picture, target, title, [math.radians(a) for a in polarizer or ()])
-    _tell(picture)
+    pictures: list[StokesPicture] = []
+    for place, nm in enumerate(colours):
+        coats = [bsdf_dict(models_of_one[place]) for _, models_of_one in painted]
+        if own:
+            air = {"max_dolp": max_dolp, "optical_depth": optical_depth}
+            stage = _stage(scene, coats, lamp, shape or (512, 512), sun_zenith, sun_azimuth, air, nm)
+        else:
+            stage = load_scene_file(Path(scene), coats, shape)
+        at = "" if nm is None else f" at {nm:g} nm"
+        with progress_bar(f"Rendering {scene}{at}", quiet) as progress:
+            picture = render_stokes(stage, spp=spp, depth=depth, seed=seed, progress=progress)
+        stated: dict[str, float] = {} if nm is None else {"wavelength": nm}
+        pictures.append(replace(picture, attrs={**picture.attrs, **notes, **stated}))
+    angles = [math.radians(a) for a in polarizer or ()]
+    if len(pictures) > 1:
+        written = _write_colours(pictures, target, title, angles)
+    else:
+        written = _write(pictures[0], target, title, angles)
+    for picture in pictures:
+        _tell(picture)
     for path in written:
         print(path)
 
@@ -168,6 +195,18 @@ def render(
 def _has_direction(light: str) -> bool:
     """Whether a light of this name comes from somewhere."""
     return light != "constant" and not light.startswith("envmap:")
+
+
+def _wavelengths(text: str | None) -> list[float | None]:
+    """Those of the pictures to render; one without a wavelength if none is given."""
+    if text is None:
+        return [None]
+    found = [number(part, "--wavelength") for part in text.split(",")]
+    if len(found) not in (1, 3) or min(found) <= 0.0 or len(set(found)) != len(found):
+        raise PbrdfError(
+            f"--wavelength {text}: give one in nm, or three different ones, for example 450,550,650"
+        )
+    return list(found)
 
 
 def _size(text: str | None) -> tuple[int, int] | None:
@@ -208,9 +247,10 @@ def _stage(
     size: tuple[int, int],
     zenith: float | None,
     azimuth: float | None,
-    max_dolp: float | None,
-    optical_depth: float | None,
+    air: dict[str, float | None],
+    wavelength: float | None,
 ) -> Any:
+    """A scene of the project's own; the optical depth is that at 550 nm, λ⁻⁴ as of air (Rayleigh) elsewhere."""
     from pbrdf.rendering.scenes import make_scene, subject
     from pbrdf.rendering.sky import Sky
 
@@ -219,8 +259,9 @@ def _stage(
         what.light[0] if zenith is None else math.radians(zenith),
         what.light[1] if azimuth is None else math.radians(azimuth),
     )
-    air = {"max_dolp": max_dolp, "optical_depth": optical_depth}
     sky = Sky(*direction, **{name: value for name, value in air.items() if value is not None})
+    if wavelength is not None:
+        sky = replace(sky, optical_depth=sky.optical_depth * (550.0 / wavelength) ** 4)
     return make_scene(what, light, size, direction=direction, sky=sky)
 
 
@@ -244,6 +285,26 @@ def _write(picture: StokesPicture, target: Path, title: str, polarizers: list[fl
         for name, drawn in figures.items():
             save_figure(drawn, folder / f"{name}.png")
     return [target / name for name in ("stokes.exr", *(f"{name}.png" for name in figures))]
+
+
+def _write_colours(
+    pictures: Sequence[StokesPicture], target: Path, title: str, polarizers: list[float]
+) -> list[Path]:
+    """Write a file and a figure for each wavelength, and a picture in colour; returns them."""
+    from pbrdf.files.atomic import atomic_folder
+    from pbrdf.rendering.picture import write_exr
+    from pbrdf.report.rendering.figure import colour_figure, stokes_figure
+    from pbrdf.report.style import save_figure
+
+    names = []
+    with atomic_folder(target, fill=True) as folder:
+        for picture in pictures:
+            nm = f"{picture.attrs['wavelength']:g}"
+            write_exr(picture, folder / f"stokes_{nm}.exr", polarizers)
+            save_figure(stokes_figure(picture, f"{title}, {nm} nm"), folder / f"stokes_{nm}.png")
+            names += [f"stokes_{nm}.exr", f"stokes_{nm}.png"]
+        save_figure(colour_figure(pictures, title), folder / "rgb.png")
+    return [target / name for name in (*names, "rgb.png")]
 
 
 def _tell(picture: StokesPicture) -> None:

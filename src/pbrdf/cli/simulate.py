@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import shutil
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -24,6 +26,7 @@ from pbrdf.errors import PbrdfError
 
 if TYPE_CHECKING:
     import numpy as np
+    import xarray as xr
 
     from pbrdf.models import Model
 
@@ -38,7 +41,9 @@ def simulate(
         str,
         model_argument("A model's JSON file, the folder of a fit, or a bundled paint."),
     ],
-    output: Annotated[Path, output_option("The new file: .nc or .csv.")],
+    output: Annotated[
+        Path | None, output_option("The new file: .nc or .csv.", show_default="CSV to standard output")
+    ] = None,
     theta_i: Annotated[
         str | None,
         angles_option("Angles of incidence: START:STOP:STEP or a list.", show_default=GRID["theta_i"]),
@@ -67,6 +72,13 @@ def simulate(
     normalised: Annotated[
         bool, typer.Option("--normalised", help="Write Q/I, U/I and V/I, or matrices over m00, without I.")
     ] = False,
+    grid: Annotated[
+        bool,
+        typer.Option(
+            "--grid",
+            help="Write arrays over theta_i, theta_r and phi, for xarray, not a list (.nc; `pbrdf` reads both).",
+        ),
+    ] = False,
     wavelength: WrittenWavelength = None,
     noise: Annotated[
         str | None,
@@ -79,12 +91,15 @@ def simulate(
 ) -> None:
     """Evaluate a model on a grid of directions, or in the plane of incidence.
 
-    On a grid: `pbrdf simulate pearl-white -o grid.nc`
+    On a grid: `pbrdf simulate pearl-white --grid -o grid.nc`
+
+    To look at: `pbrdf simulate pearl-white --plane --theta-i 45 --theta-r 0:80:20`
 
     A measurement: `pbrdf simulate model.json --bistatic 60,80,100 --noise 0.01 -o run.csv`
     """
     from pbrdf.backend import set_backend
     from pbrdf.data import make_dataset, write
+    from pbrdf.data.formats.grid import write_grid
     from pbrdf.inversion.noise import parse_noise
     from pbrdf.version import __version__
 
@@ -98,9 +113,16 @@ def simulate(
         raise PbrdfError("--theta-i follows from --bistatic and --theta-r: leave it out")
     if mueller and incident != "natural":
         raise PbrdfError("--mueller holds every illumination: leave --incident out")
-    if output.suffix.lower() not in (".nc", ".csv"):
-        raise PbrdfError(f"--output {output}: the extension must be .nc or .csv")
-    require_folder_of(output)
+    if grid and (plane or bistatic is not None):
+        raise PbrdfError(
+            "--grid: directions in the plane of incidence are no grid of theta_i, theta_r and phi"
+        )
+    if grid and (output is None or output.suffix.lower() != ".nc"):
+        raise PbrdfError("--grid: arrays are written to netCDF; give --output FILE.nc")
+    if output is not None:
+        if output.suffix.lower() not in (".nc", ".csv"):
+            raise PbrdfError(f"--output {output}: the extension must be .nc or .csv")
+        require_folder_of(output)
     light = stokes_vector(incident, "--incident")
     # The absolute part that a fit assumes is for real data with stray light: none is added here unasked.
     stated = None if noise is None else parse_noise(f"{noise},0" if _PLAIN_NUMBER.fullmatch(noise) else noise)
@@ -129,8 +151,24 @@ def simulate(
             + (f", noise {stated}, seed {seed}" if stated else ", without noise"),
         },
     )
-    write(dataset, output)
+    if output is None:
+        _print(dataset)
+        return
+    (write_grid if grid else write)(dataset, output)
     print(f"{output}: {dataset.sizes['geometry']} geometries, simulated")
+
+
+def _print(dataset: xr.Dataset) -> None:
+    """Write CSV to standard output."""
+    from tempfile import TemporaryDirectory
+
+    from pbrdf.data import write
+
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / "simulated.csv"
+        write(dataset, file)
+        with file.open(encoding="utf-8", newline="") as text:
+            shutil.copyfileobj(text, sys.stdout)
 
 
 def _evaluate(

@@ -1,19 +1,25 @@
-"""Data of many wavelengths, before a model is fitted to them or a material looked for."""
+"""Several wavelengths: data before a model is fitted to them or a material looked for, and models to paint with."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pbrdf.cli.reading import Reading
-from pbrdf.errors import DataError
+from pbrdf.errors import DataError, PbrdfError
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["MANY", "require_choice"]
+    from pbrdf.models import Model
+
+__all__ = ["MANY", "painted_with", "require_choice"]
 
 #: What becomes of the data if nothing is chosen, in words.
 _FITTED = "one set of parameters for all would be fitted"
+#: Wavelengths that differ by no more are the same, nm.
+_SAME = 0.5
 #: From so many wavelengths on, one set of parameters for all is hardly meant: it has to be said.
 MANY = 6
 
@@ -63,3 +69,66 @@ def require_choice(
         f"{source}: there are {known.size} wavelengths, {known[0]:g} … {known[-1]:g} nm, and {otherwise}; choose "
         f"--wavelength {middle:g} for one{split}; or --select wavelength={low:g}:{high:g} if one set for these is meant"
     )
+
+
+def painted_with(
+    sources: Sequence[str], wavelengths: Sequence[float | None]
+) -> list[tuple[str, list[Model]]]:
+    """What each object is painted with: the name of the source, and the model of each wavelength.
+
+    Parameters
+    ----------
+    sources
+        As of :func:`pbrdf.cli.sources.open_model`: for each object one for each wavelength in turn, or the
+        folder of a fit with parameters of each wavelength.
+    wavelengths
+        nm; None where none is stated.
+
+    Raises
+    ------
+    PbrdfError
+        If models do not go into the wavelengths, or a fit knows one of them not.
+    """
+    from pbrdf.cli.sources import open_model
+
+    painted: list[tuple[str, list[Model]]] = []
+    waiting: list[str] = []
+    for source in sources:
+        models = None if wavelengths[0] is None else _fitted_at(source, wavelengths)
+        if models is not None and not waiting:
+            painted.append((source, models))
+            continue
+        waiting.append(source)
+        if len(waiting) == len(wavelengths):
+            painted.append((waiting[0], [open_model(one) for one in waiting]))
+            waiting = []
+    if waiting:
+        raise PbrdfError(
+            f"--wavelength: each object needs {len(wavelengths)} models, one for each wavelength, and {waiting[-1]} is "
+            f"not followed by as many; or give the folder of a fit with --split NAME=wavelength"
+        )
+    return painted
+
+
+def _fitted_at(source: str, wavelengths: Sequence[float | None]) -> list[Model] | None:
+    """The models that a fit with parameters of each wavelength found; None if the source is no such fit."""
+    from pbrdf.inversion.stored_result import FILE_NAME
+
+    folder = Path(source)
+    if not (folder / FILE_NAME).is_file():
+        return None
+    from pbrdf.inversion.stored_result import load_fit
+
+    result = load_fit(folder)
+    known = result.space.labels("wavelength")
+    if not known:
+        return None
+    values = [result.estimates[name].value for name in result.space.names]
+    models = []
+    for wanted in wavelengths:
+        label = min(known, key=lambda one: abs(float(one) - float(wanted or 0.0)))
+        if abs(float(label) - float(wanted or 0.0)) > _SAME:
+            shown = ", ".join(f"{float(one):g}" for one in known)
+            raise PbrdfError(f"--wavelength {wanted:g}: {source} has parameters at {shown} nm")
+        models.append(result.space.build(values, label=label))
+    return models

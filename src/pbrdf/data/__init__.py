@@ -9,6 +9,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from pbrdf.data import convert
     from pbrdf.data.build import make_dataset
     from pbrdf.data.formats.declaration import Reader
     from pbrdf.data.readers import read, register_reader, write
@@ -19,6 +20,7 @@ __all__ = [
     "Issue",
     "Reader",
     "check",
+    "convert",
     "make_dataset",
     "measured_channels",
     "read",
@@ -39,6 +41,8 @@ _MODULE_OF = {name: module for module, names in _HOME.items() for name in names}
 
 
 def __getattr__(name: str) -> Any:
+    if name == "convert":
+        return importlib.import_module("pbrdf.data.convert")
     if name not in _MODULE_OF:
         raise AttributeError(f"module 'pbrdf.data' has no attribute {name!r}")
     return getattr(importlib.import_module(_MODULE_OF[name]), name)

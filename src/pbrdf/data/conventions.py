@@ -1,5 +1,7 @@
 """Conversions between the conventions of others and the project's.
 
+Those by the name of a program are made of these: :mod:`pbrdf.data.convert`.
+
 The project's convention: φ = 0 is the forward half-plane. For light travelling along k, s = k×ẑ/|k×ẑ|, where
 ẑ is the surface normal, and p = s×k, so that (p, s, k) is right-handed; Q = |E_p|² − |E_s|² and
 U = 2 Re(E_p E_s*). Angles are in radians. Stokes arrays have the shape (..., 4), Mueller matrices
@@ -25,10 +27,8 @@ __all__ = [
     "covariance_swap_sp",
     "dolp_aolp_from_stokes",
     "mueller_flip_v",
-    "mueller_from_scatmech",
     "mueller_sp_to_xyxy",
     "mueller_swap_sp",
-    "mueller_to_scatmech",
     "mueller_xyxy_to_sp",
     "qu_from_dolp_aolp",
     "reflectance_factor_to_brdf",
@@ -107,20 +107,6 @@ def covariance_swap_sp(covariance: ArrayLike) -> NDArray[np.float64]:
 def covariance_flip_v(covariance: ArrayLike) -> NDArray[np.float64]:
     """Covariances of Stokes vectors, shape (..., 4, 4), with the other handedness counted as V > 0."""
     return np.asarray(covariance, dtype=np.float64) * np.outer(_FLIP_V, _FLIP_V)
-
-
-def mueller_from_scatmech(mueller: ArrayLike) -> NDArray[np.float64]:
-    """Mueller matrices of SCATMECH in its ``psps`` frame to the project's.
-
-    SCATMECH counts Q = I_s − I_p in the right-handed frame (s, p, k). Its V > 0 is the project's: the sign
-    of V is not touched, as a comparison of Fresnel reflection off absorbing facets shows.
-    """
-    return mueller_swap_sp(mueller)
-
-
-def mueller_to_scatmech(mueller: ArrayLike) -> NDArray[np.float64]:
-    """Inverse of :func:`mueller_from_scatmech`."""
-    return mueller_swap_sp(mueller)
 
 
 def mueller_xyxy_to_sp(mueller: ArrayLike, phi: ArrayLike) -> NDArray[np.float64]:
@@ -210,8 +196,7 @@ def dolp_aolp_from_stokes(stokes: ArrayLike) -> tuple[NDArray[np.float64], NDArr
     intensity, q, u = array[..., 0], array[..., 1], array[..., 2]
     linear = np.hypot(q, u)
     dolp = np.divide(linear, intensity, out=np.full_like(linear, np.nan), where=intensity != 0)
-    # Adding 0.0 turns −0.0 into 0.0, which keeps light along s at +π/2 and never at −π/2.
-    return dolp, 0.5 * np.arctan2(u + 0.0, q)
+    return dolp, within_half_turn(0.5 * np.arctan2(u, q), 0.5 * np.pi)
 
 
 def qu_from_dolp_aolp(

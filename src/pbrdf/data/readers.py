@@ -258,6 +258,7 @@ def _read_checked(reader: Reader, path: Path, options: Mapping[str, Any]) -> xr.
     """What a reader of others gives, checked: neither its mistakes nor its data get any further."""
     import xarray as xr
 
+    from pbrdf.data.schema import with_group
     from pbrdf.data.validation import validate
 
     try:
@@ -269,18 +270,19 @@ def _read_checked(reader: Reader, path: Path, options: Mapping[str, Any]) -> xr.
     if not isinstance(ds, xr.Dataset):
         raise DataError(f"{path}: the reader {reader.name!r} gives {type(ds).__name__}, not a data set")
     validate(ds, origin=str(path))
-    return ds
+    return with_group(ds)
 
 
 def _write_checked(
     name: str, function: Callable[[xr.Dataset, Path], None], ds: xr.Dataset, path: Path
 ) -> None:
     """Let a writer of others write what is valid."""
+    from pbrdf.data.schema import with_group
     from pbrdf.data.validation import validate
 
     validate(ds)
     try:
-        function(ds, path)
+        function(with_group(ds), path)
     except PbrdfError:
         raise
     except Exception as error:

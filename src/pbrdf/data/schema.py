@@ -11,9 +11,9 @@ Coordinates along ``geometry``
         within one turn, |φ| ≤ 2π.
     ``wavelength`` (optional)
         In nm; NaN where it is not known.
-    ``group``
+    ``group`` (optional)
         What was measured together, for example one camera position: integers, or text without line
-        breaks and surrounding white space. 0 everywhere when nothing was stated.
+        breaks and surrounding white space. 0 everywhere when nothing was stated, or where it is left out.
 
 Data variables: exactly one of five forms
     (a) Stokes parameters of the reflected light under the stated illumination: ``I`` and any of ``Q``,
@@ -71,6 +71,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
+import xarray as xr
 
 __all__ = [
     "ANGLES",
@@ -178,6 +179,13 @@ def variable_units(variable: str, quantity: str) -> str:
         return ""
     unit = UNITS.get(quantity, "")
     return "1/sr2" if variable == COVARIANCE and unit == "1/sr" else unit
+
+
+def with_group(ds: xr.Dataset) -> xr.Dataset:
+    """The data set with a coordinate ``group``: 0 everywhere where it has none."""
+    if "group" in ds.coords or DIMENSION not in ds.sizes:
+        return ds
+    return ds.assign_coords(group=(DIMENSION, np.zeros(ds.sizes[DIMENSION], dtype=np.int64)))
 
 
 def spells_integer(label: str) -> bool:

@@ -39,6 +39,7 @@ from pbrdf.data.schema import (
     spells_integer,
     std_name,
     variable_dims,
+    with_group,
 )
 from pbrdf.errors import DataError, visible
 from pbrdf.optics.stokes import STOKES
@@ -94,9 +95,9 @@ class _Labels:
         # One line of a file may hold several rows, for example one per wavelength.
         indices = rows.tolist()
         names = list(dict.fromkeys(indices if self.lines is None else map(self.lines.__getitem__, indices)))
-        kind = "row" if self.lines is None else "line"
+        kind, several = ("index", "indices") if self.lines is None else ("line", "lines")
         more = f" and {len(names) - _ROWS_NAMED} more" if len(names) > _ROWS_NAMED else ""
-        return f"{kind}{'s' if len(names) > 1 else ''} {', '.join(map(str, names[:_ROWS_NAMED]))}{more}"
+        return f"{several if len(names) > 1 else kind} {', '.join(map(str, names[:_ROWS_NAMED]))}{more}"
 
     def variable(self, name: str) -> str:
         return f"{name} (column {self.columns[name]!r})" if name in self.columns else name
@@ -113,7 +114,8 @@ def check(
         The data set.
     lines
         Number of the file's line that each row came from, for messages; None asks the data set's origin
-        (:mod:`pbrdf.data.origin`) and, where it knows none, names rows by their index along ``geometry``, from 0.
+        (:mod:`pbrdf.data.origin`) and, where it knows none, names rows by their index along ``geometry``, from 0: as
+        ``index 1``, whereas lines and rows of files are counted from 1.
     columns
         The file's column names by variable, for messages; None asks the data set's origin.
 
@@ -127,7 +129,7 @@ def check(
     origin = origin_of(ds)
     issues += [_warning("", sentence) for sentence in (origin.remarks if origin else ())]
     if not any(issue.severity == "error" for issue in issues):
-        issues += _repeats(ds, labels)
+        issues += _repeats(with_group(ds), labels)
     return sorted(issues, key=lambda issue: issue.severity != "error")
 
 
@@ -140,6 +142,8 @@ def _labels(ds: xr.Dataset, lines: Sequence[int] | None, columns: Mapping[str, s
 
 
 def _judged(ds: xr.Dataset, labels: _Labels) -> list[Issue]:
+    if "group" not in ds.variables:
+        ds = with_group(ds)
     issues = [*_attributes(ds), *_structure(ds)]
     # Values can only be judged where the arrays have the right shape and type.
     if not any(issue.severity == "error" for issue in issues):
@@ -263,7 +267,7 @@ def _structure(ds: xr.Dataset) -> Iterator[Issue]:
         return
     if ds.sizes[DIMENSION] == 0:
         yield _error("", "there are no rows")
-    for name in ("theta_i", "theta_r", "phi", "group"):
+    for name in ("theta_i", "theta_r", "phi"):
         if name not in ds.coords:
             yield _error(name, f"the coordinate {name} is missing")
     known = {*COORDINATES, *VARIABLES, *map(std_name, VARIABLES), COVARIANCE, *STOKES_AXES}

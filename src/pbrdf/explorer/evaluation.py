@@ -134,10 +134,12 @@ def _log10(x: Any) -> Any:
 
 
 def _angle(q: Any, u: Any) -> Any:
-    """Half the angle of (q, u), degrees within −90 … 90; 0 where there is none."""
+    """Half the angle of (q, u), degrees within (−90, 90]; 0 where there is none."""
     import drjit as dr
 
-    return dr.select((q != 0.0) | (u != 0.0), dr.atan2(u, q) * (90.0 / math.pi), 0.0)
+    turn = dr.atan2(u, q)
+    turn = dr.select(turn <= -dr.pi, dr.pi, turn)
+    return dr.select((q != 0.0) | (u != 0.0), turn * (90.0 / math.pi), 0.0)
 
 
 def _value(quantity: str, S: Sequence[Any], M: Sequence[Sequence[Any]]) -> Any:

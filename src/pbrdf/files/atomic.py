@@ -49,6 +49,28 @@ _MARK_TEXT = (
     "Files of two runs are mixed in this folder as long as this one is there: pbrdf was moving new files into it. "
     "If it is not at work any more it was interrupted; run the same command again.\n"
 )
+#: A folder that is to be made is not meant where its name ends like that of a file.
+_FILES = frozenset(
+    [
+        ".csv",
+        ".tsv",
+        ".txt",
+        ".dat",
+        ".nc",
+        ".json",
+        ".toml",
+        ".xlsx",
+        ".png",
+        ".pdf",
+        ".svg",
+        ".html",
+        ".htm",
+        ".tif",
+        ".tiff",
+        ".npy",
+        ".exr",
+    ]
+)
 #: A folder with more files of others than this is filled in place.
 _MOST_LINKS = 2000
 #: Seconds after which a hidden folder that cannot be locked, or a file of an older version, is taken for a left one.
@@ -169,6 +191,7 @@ def require_new_folder(path: Path) -> None:
         raise DataError(
             f"{path}: there is something of that name already; choose another folder with --output"
         )
+    _require_no_name_of_a_file(path)
     if not path.resolve().parent.is_dir():
         raise DataError(f"{path}: there is no folder {path.parent}")
 
@@ -183,6 +206,7 @@ def require_writable_folder(path: Path) -> None:
     """
     if path.exists() and not path.is_dir():
         raise DataError(f"{path}: there is a file of that name; choose another folder with --output")
+    _require_no_name_of_a_file(path)
     place = path.resolve()
     trial = _name_beside(place)
     made = _missing_parents(place)
@@ -193,6 +217,14 @@ def require_writable_folder(path: Path) -> None:
         raise _not_written(path, error) from error
     finally:
         _remove_empty(made)
+
+
+def _require_no_name_of_a_file(path: Path) -> None:
+    if path.suffix.lower() in _FILES and not path.is_dir():
+        raise DataError(
+            f"{path}: several files are written, into a folder, and this is the name of one; give a "
+            f"folder with --output, such as {path.with_suffix('')}"
+        )
 
 
 # The hidden folder

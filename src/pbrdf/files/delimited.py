@@ -101,6 +101,11 @@ class Table:
     sheet: str = ""
     warnings: list[str] = field(default_factory=list)
 
+    @property
+    def names_in_comment(self) -> bool:
+        """Whether the names stand in a comment."""
+        return self.statements_end > self.names_line
+
     def __len__(self) -> int:
         return len(self.body)
 

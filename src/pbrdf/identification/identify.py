@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pbrdf.data.schema import NORMALISED, is_ratio
+from pbrdf.data.schema import NORMALISED, is_ratio, with_group
 from pbrdf.data.validation import validate
 from pbrdf.errors import FitError
 from pbrdf.identification.conformal import Calibration, nominal, probabilities
@@ -209,6 +209,7 @@ def identify(
         If the library is empty, an option is none, or the data are not valid.
     """
     validate(dataset)
+    dataset = with_group(dataset)
     if isinstance(noise, str):
         noise = parse_noise(noise)
     observed = Observations.from_dataset(dataset, noise)

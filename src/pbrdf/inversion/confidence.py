@@ -97,7 +97,7 @@ def better_notes(optima: Optima, better: dict[str, float] | None, chi2: float) -
     """What to tell of a better optimum, if :func:`better_optimum` gave one."""
     if better is None:
         return []
-    where = ", ".join(f"{name}={value:.6g}" for name, value in better.items())
+    where = ", ".join(f"{p.name}={p.shown(better[p.name], '.6g')}" for p in optima.space.free)
     return [
         f"Profiling found a better optimum (χ² {chi2:.6g}, the fit's is {optima.chi2[0]:.6g}) at {where}: fit again "
         "from there; what is shown refers to the fit's."

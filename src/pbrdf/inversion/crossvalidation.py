@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pbrdf.data.schema import with_group
 from pbrdf.errors import FitError
 from pbrdf.inversion.comparison import compare
 from pbrdf.inversion.fit import fit
@@ -127,9 +128,12 @@ class CrossValidation:
             row = table.sel(parameter=name)
             jackknife, stated = float(row["jackknife"]), float(row["standard_error"])
             if jackknife > 3.0 * stated:  # False where the fit states none
+                found, claimed = (
+                    self.full.estimates[name].parameter.shown(x, ".2g") for x in (jackknife, stated)
+                )
                 lines.append(
-                    f"{name} differs between folds more than its standard error allows ({jackknife:.2g} against "
-                    f"{stated:.2g}): parts of the data disagree about it."
+                    f"{name} differs between folds more than its standard error allows ({found} against "
+                    f"{claimed}): parts of the data disagree about it."
                 )
         failed = [f.label for f in self.folds if not f.converged]
         if failed:
@@ -198,6 +202,7 @@ def cross_validate(
         raise FitError(f"starts={starts}: at least one start is needed")
     if folds is not None and folds < 2:
         raise FitError(f"folds={folds}: at least two folds are needed")
+    dataset = with_group(dataset)
     full = fit(dataset, model, starts=starts, seed=seed, max_iterations=max_iterations, **arguments)
     number, labels = divide(dataset, by, folds, seed)
     held = [number == k for k in range(len(labels))]

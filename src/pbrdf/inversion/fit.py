@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pbrdf.data.schema import COVARIANCE
+from pbrdf.data.schema import COVARIANCE, with_group
 from pbrdf.data.validation import validate
 from pbrdf.errors import FitError
 from pbrdf.inversion.comparison import compare, near_specular_tilt
@@ -130,6 +130,7 @@ def fit(
         If the options or the data do not allow a fit; the message says why.
     """
     validate(dataset)
+    dataset = with_group(dataset)
     if isinstance(noise, str):
         noise = parse_noise(noise)
     if isinstance(hold_out, str):

@@ -31,7 +31,7 @@ class HoldOut:
     kind
         ``"group"``, ``"theta_i"``, ``"theta_r"`` (degrees), ``"wavelength"`` (nm) or ``"fraction"``.
     values
-        The values held out; for ``"fraction"`` one number between 0 and 1.
+        The values held out; for ``"fraction"`` one number between 0 and 1, or one of per cent, ``"20%"``.
     """
 
     kind: str
@@ -90,9 +90,12 @@ class HoldOut:
         return mask
 
     def _fraction(self, size: int, seed: int) -> np.ndarray:
-        share = self._number(self.values[0])
+        stated = self.values[0].strip()
+        share = 0.01 * self._number(stated[:-1]) if stated.endswith("%") else self._number(stated)
         if len(self.values) > 1 or not 0.0 < share < 1.0:
-            raise FitError(f"hold-out {self}: give one fraction between 0 and 1")
+            raise FitError(
+                f"hold-out {self}: give one fraction between 0 and 1, or per cent: fraction=0.2, fraction=20%"
+            )
         count = min(max(1, round(share * size)), size)
         mask = np.zeros(size, dtype=bool)
         mask[np.random.default_rng(seed).choice(size, count, replace=False)] = True

@@ -25,6 +25,7 @@ from pbrdf.inversion.optimum import Optimum
 from pbrdf.inversion.refits import Optima
 from pbrdf.inversion.statistics import covariance, prior_spread
 from pbrdf.inversion.verdict import verdict
+from pbrdf.models.parameters import Parameter, shown_unit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -249,14 +250,16 @@ def _combination(
     space = optima.space
     before = space.to_parameters(best)
     ends = [space.to_parameters(moved[k, lane[k]])[columns] for k in (1, 0)]
-    named_as = [space.names[i] for i in columns]
+    parameters = [space.free[i] for i in columns]
+    named_as = [p.name for p in parameters]
     changes = dict(zip(named_as, map(float, ends[1 - side] - before[columns]), strict=True))
     cost = float(rise[side, lane[side]])
     if determined or len(columns) > 1:
-        move = _move(changes, before[columns])
+        move = _move(parameters, changes, before[columns])
     else:
         (low,), (high,) = ends
-        move = f"moving it anywhere between {low:.3g} and {high:.3g}"
+        low, high = (parameters[0].shown(end, ".3g") for end in (low, high))
+        move = f"moving it anywhere between {low} and {high}"
         cost = float(max(rise[0, lane[0]], rise[1, lane[1]]))
     joined = _listed(named_as)
     if determined:
@@ -268,11 +271,12 @@ def _combination(
     return Combination(changes, cost, determined, f"{opening}: {move} changes χ² by {limit}{others}.")
 
 
-def _move(changes: dict[str, float], before: np.ndarray) -> str:
+def _move(parameters: list[Parameter], changes: dict[str, float], before: np.ndarray) -> str:
     """``raising t by 0.10 to 0.77 with n lowered by 0.02 to 1.60``."""
     parts: list[str] = []
-    for (name, change), value in zip(changes.items(), before, strict=True):
-        amount, end = _numbers(float(value), change)
+    for parameter, value in zip(parameters, before, strict=True):
+        name, change = parameter.name, changes[parameter.name]
+        amount, end = _numbers(parameter, float(value), change)
         if parts:
             parts.append(f"{name} {'raised' if change > 0.0 else 'lowered'} by {amount} to {end}")
         else:
@@ -285,10 +289,10 @@ def _listed(words: list[str]) -> str:
     return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
 
 
-def _numbers(value: float, change: float) -> tuple[str, str]:
+def _numbers(parameter: Parameter, value: float, change: float) -> tuple[str, str]:
     """Size of a change with two digits, and where it leads with as many decimals."""
-    size = abs(change)
+    size = abs(change) * shown_unit(parameter)[0]
     if not 1e-6 <= size < 1e6:
-        return f"{size:.2g}", f"{value + change:.6g}"
-    decimals = max(0, 1 - math.floor(math.log10(size)))
-    return f"{size:.{decimals}f}", f"{value + change:.{decimals}f}"
+        return parameter.shown(abs(change), ".2g"), parameter.shown(value + change, ".6g")
+    form = f".{max(0, 1 - math.floor(math.log10(size)))}f"
+    return parameter.shown(abs(change), form), parameter.shown(value + change, form)

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pbrdf.data.schema import with_group
 from pbrdf.data.validation import validate
 from pbrdf.errors import FitError, PbrdfError
 from pbrdf.inversion.crossvalidation import SCHEMES, cross_validate, divide
@@ -347,6 +348,7 @@ def compare_models(
         If nothing can be held out so, or no model can be fitted; the message says why.
     """
     validate(dataset)
+    dataset = with_group(dataset)
     if isinstance(hold_out, str):
         hold_out = HoldOut.parse(hold_out)
     if hold_out is not None and (by is not None or folds is not None):

@@ -41,6 +41,9 @@ class Noise(Protocol):
             On the scale of a BRDF, shape (…, G).
         """
 
+    def of_ratios(self) -> str:
+        """What it comes to, in words, where ratios were measured and no intensity."""
+
 
 @dataclass(frozen=True)
 class NoiseModel:
@@ -113,6 +116,10 @@ class NoiseModel:
     def __str__(self) -> str:
         return f"{self.relative:.3g} of the intensity plus {self.absolute:.3g} of its median"
 
+    def of_ratios(self) -> str:
+        """See :class:`Noise`."""
+        return f"{math.hypot(self.relative, self.absolute):.2g} for every ratio"
+
 
 @dataclass(frozen=True)
 class InstrumentNoise:
@@ -169,6 +176,10 @@ class InstrumentNoise:
             f"components, read noise {self.read:g}, quantisation step {self.quantum:g}"
         )
 
+    def of_ratios(self) -> str:
+        """See :class:`Noise`."""
+        return f"instrument: {self.linear:.3g} for linear and {self.circular:.3g} for circular ratios"
+
 
 @dataclass(frozen=True)
 class EqualNoise:
@@ -188,6 +199,10 @@ class EqualNoise:
 
     def __str__(self) -> str:
         return "equal weights"
+
+    def of_ratios(self) -> str:
+        """See :class:`Noise`."""
+        return str(self)
 
 
 def parse_noise(text: str) -> Noise:

@@ -59,7 +59,9 @@ def notes_on(
     for name, e in result.estimates.items():
         if e.verdict.startswith("at "):
             bound = e.lower if "lower" in e.verdict else e.upper
-            notes.append(f"{name} stands {e.verdict} ({bound:g}); its standard error is not defined there.")
+            notes.append(
+                f"{name} stands {e.verdict} ({e.parameter.shown(bound, 'g')}); its standard error is not defined there."
+            )
     rivals = [o for o in result.optima[1:] if o.chi2 <= result.optima[0].chi2 + 4.0]
     if rivals:
         notes.append(

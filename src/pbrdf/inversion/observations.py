@@ -12,7 +12,7 @@ import numpy as np
 
 from pbrdf.data.conventions import qu_from_dolp_aolp
 from pbrdf.data.covariance import correlations
-from pbrdf.data.schema import COVARIANCE, NORMALISED, VARIABLES, is_ratio, std_name
+from pbrdf.data.schema import COVARIANCE, NORMALISED, VARIABLES, is_ratio, std_name, with_group
 from pbrdf.errors import FitError
 from pbrdf.inversion.noise import Noise, NoiseModel
 from pbrdf.optics.stokes import STOKES
@@ -107,7 +107,7 @@ class Observations:
             std=np.stack(found.std),
             illumination=tuple(float(v) for v in ds.attrs["illumination"]),  # type: ignore[arg-type]
             std_known=bool(found.std_known),
-            group=ds["group"].values,
+            group=with_group(ds)["group"].values,
             wavelength=ds["wavelength"].values if "wavelength" in ds.coords else None,
             scale=found.scale,
             unstated=int(found.unstated),
@@ -123,7 +123,7 @@ class Observations:
         if not np.tril(correlation, -1).any():
             return result
         return replace(result, correlation=correlation)._regular(
-            "the covariance of row {} is singular, as if some combination of {} were known exactly: correct it, or "
+            "the covariance at index {} is singular, as if some combination of {} were known exactly: correct it, or "
             "state a noise, which replaces all uncertainties"
         )
 
@@ -258,7 +258,7 @@ class Observations:
         diagonal = np.einsum("gcc->cg", covariance)
         proper = np.isfinite(covariance).all(axis=(1, 2)) & (diagonal > 0.0).all(axis=0)
         proper &= uneven <= 1e-9 * np.abs(covariance).max(axis=(1, 2))
-        message = "covariance of geometry {} is not symmetric and positive definite"
+        message = "covariance at index {} is not symmetric and positive definite"
         if not proper.all():
             raise FitError(message.format(int(np.argmin(proper))))
         scale = np.ones(diagonal.shape)
@@ -449,14 +449,13 @@ def _propagated(
 
 def noise_in_words(noise: Noise | None, data: Observations) -> str:
     """Where the standard uncertainties of fitted data come from."""
+    ratios_alone = not {"I", "m00"} & set(data.channels)
     if noise is not None:
-        return f"stated: {noise}"
+        return f"stated: {noise.of_ratios() if ratios_alone else noise}"
     if data.std_known:
         kind = "standard uncertainties" if data.correlation is None else "covariances"
         left_out = "" if data.unstated == 0 else f"; values without one are left out: {data.unstated}"
         return f"{kind} of the data set{left_out}"
     assumed = NoiseModel()
-    words = str(assumed)
-    if not {"I", "m00"} & set(data.channels):
-        words = f"{math.hypot(assumed.relative, assumed.absolute):.2g} for every ratio"
+    words = assumed.of_ratios() if ratios_alone else str(assumed)
     return f"assumed, as the data set states no (or not every) uncertainty: {words}"

@@ -153,14 +153,15 @@ def _parameters(result: Optimum, level: Level) -> list[Finding]:
         sentence = "The parameters are those of no sample, as the model does not describe the data."
         findings.append(Finding("parameters", Severity.WARNING, sentence))
     for name, estimate in result.estimates.items():
+        value = estimate.parameter.shown(estimate.value)
         if estimate.verdict.startswith("at "):
             sentence = (
-                f"{name} = {estimate.value:.4g} stands {estimate.verdict}: the data pull it further, and the other "
+                f"{name} = {value} stands {estimate.verdict}: the data pull it further, and the other "
                 "parameters make up for that."
             )
             findings.append(Finding("parameters", Severity.WARNING, sentence))
         elif estimate.verdict == "undetermined":
-            sentence = f"{name} = {estimate.value:.4g} is not determined by these data."
+            sentence = f"{name} = {value} is not determined by these data."
             findings.append(Finding("parameters", Severity.WARNING, sentence))
     if not findings:
         sentence = "Every fitted parameter is determined and inside its bounds."

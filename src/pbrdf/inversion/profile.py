@@ -182,17 +182,17 @@ def profile(
     notes = better_notes(optima, better, better_chi2)
     for number, (name, interval) in enumerate(intervals.items()):
         for offset, side in enumerate(("lower", "upper")):
-            end = (interval.lower, interval.upper)[offset]
+            end = result.space.free[columns[number]].shown((interval.lower, interval.upper)[offset])
             others = np.flatnonzero(ends.blocked[0, 2 * number + offset])
             if ends.at_bound[0, 2 * number + offset]:
                 notes.append(
-                    f"{name}: the interval reaches the {side} bound ({end:.4g}); the data do not limit it on this "
+                    f"{name}: the interval reaches the {side} bound ({end}); the data do not limit it on this "
                     "side."
                 )
             elif len(others):
                 joined = ", ".join(result.space.names[i] for i in others)
                 notes.append(
-                    f"{name}: at the {side} end ({end:.4g}) {joined} lies on a bound; the end depends on where that "
+                    f"{name}: at the {side} end ({end}) {joined} lies on a bound; the end depends on where that "
                     "bound is."
                 )
     unresolved = [chosen[i // 2] for i in np.flatnonzero(~ends.found[0])]

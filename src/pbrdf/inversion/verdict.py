@@ -360,9 +360,10 @@ def _polarisation(result: Optimum) -> tuple[np.ndarray, np.ndarray]:
     measured = table["I_measured"].values if "I_measured" in table else modelled
     dark = DARK * typical(measured)
     light = np.where(measured > dark, measured, np.nan)
+    shining = np.where(modelled == 0.0, np.nan, modelled)
     error, signal, present = np.zeros(size), np.zeros(size), np.zeros(size, dtype=bool)
     for channel in channels:
-        by = (1.0, 1.0) if is_ratio(channel) else (modelled, light)
+        by = (1.0, 1.0) if is_ratio(channel) else (shining, light)
         value = table[f"{channel}_measured"].values / by[1]
         wrong = table[f"{channel}_modelled"].values / by[0] - value
         here = np.isfinite(wrong)

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Literal, Self
 
-__all__ = ["Option", "Parameter"]
+__all__ = ["Option", "Parameter", "shown_unit"]
 
 
 @dataclass(frozen=True)
@@ -61,6 +61,11 @@ class Parameter:
     vanishing: bool = False
     extinction_of: str | None = None
 
+    def shown(self, value: float, form: str = ".4g") -> str:
+        """A value of it in a sentence: angles in degrees, with their unit."""
+        factor, unit = shown_unit(self)
+        return f"{factor * value:{form}}{unit if unit == '°' else ''}"
+
     def documentation(self) -> str:
         """One sentence on what to give, for the docstring of a model."""
         low, high = self.domain
@@ -70,6 +75,11 @@ class Parameter:
             kept = "a fit takes its bounds from the data"
         held = "" if self.fitted else f", held at {self.default:g} unless set free"
         return f"{self.description}; unit {self.unit}; {limits}; {kept}{held}."
+
+
+def shown_unit(parameter: Parameter) -> tuple[float, str]:
+    """Factor and unit in which people and files see a parameter: angles in degrees."""
+    return (180.0 / math.pi, "°") if parameter.unit == "rad" else (1.0, parameter.unit)
 
 
 class Option(tuple[str, ...]):

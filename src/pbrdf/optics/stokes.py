@@ -1,15 +1,16 @@
-"""Degree and angle of polarisation of Stokes vectors (I, Q, U, V) with Q = I_p − I_s.
+"""Degree, angle and ellipticity of polarisation of Stokes vectors (I, Q, U, V) with Q = I_p − I_s.
 
 Each function takes a Stokes array of any kind and returns the same kind: NumPy arrays and sequences of
 shape (..., 4), xarray arrays with a dimension ``stokes_out`` (or ``stokes``), Dr.Jit ``Array4f`` values. Where
-I = 0 there is no light and the result is NaN.
+I = 0 there is no light and a degree is NaN.
 """
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
-__all__ = ["STOKES", "aolp", "docp", "dolp", "dop"]
+__all__ = ["STOKES", "aolp", "docp", "dolp", "dop", "ellipticity"]
 
 #: The Stokes parameters in their order.
 STOKES = ("I", "Q", "U", "V")
@@ -27,6 +28,23 @@ def docp(stokes: Any) -> Any:
     return _ratio(abs(v), intensity)
 
 
+def ellipticity(stokes: Any) -> Any:
+    """Ellipticity angle ½ atan2(V, √(Q² + U²)) in radians, within [−π/4, π/4], V > 0 (left circular) positive.
+
+    Its tangent is the ratio of the short to the long axis of the ellipse of the polarised part: natural light added to
+    a beam does not change it, nor does a turn of the frame. Without polarisation it is 0.
+    """
+    _, q, u, v = _components(stokes)
+    linear = _sqrt(q * q + u * u)
+    if _is_drjit(stokes):
+        import drjit as dr
+
+        return 0.5 * dr.atan2(v, linear)
+    import numpy as np
+
+    return 0.5 * np.arctan2(v, linear)
+
+
 def dop(stokes: Any) -> Any:
     """Degree of polarisation, √(Q² + U² + V²)/I."""
     intensity, q, u, v = _components(stokes)
@@ -34,15 +52,22 @@ def dop(stokes: Any) -> Any:
 
 
 def aolp(stokes: Any) -> Any:
-    """Angle of linear polarisation ½ atan2(U, Q) in radians, within (−π/2, π/2], from p towards s."""
+    """Angle of linear polarisation ½ atan2(U, Q) in radians, within (−π/2, π/2], from p towards s.
+
+    Light along s is at π/2 whatever the sign of a U that is zero or rounds to it.
+    """
     _, q, u, _ = _components(stokes)
+    right = 0.5 * math.pi
     if _is_drjit(stokes):
         import drjit as dr
 
-        return 0.5 * dr.atan2(u, q)
+        angle = 0.5 * dr.atan2(u, q)
+        return dr.select(angle <= -right, right, angle)
     import numpy as np
 
-    return 0.5 * np.arctan2(u, q)
+    angle = 0.5 * np.arctan2(u, q)
+    # -π/2 alone lies at or below the open end: the other end is the same direction
+    return angle + np.pi * (angle <= -right)
 
 
 def _is_drjit(value: Any) -> bool:

@@ -43,11 +43,15 @@ class StokesPicture:
         Standard errors of the means over the samples, the same shape; NaN where one pass alone tells nothing of them.
     attrs
         What was rendered, and how.
+    surface
+        Which pixels show a surface and not what is behind all of them, the sky for instance; shape (rows, columns),
+        None where that is not known.
     """
 
     stokes: np.ndarray
     std: np.ndarray
     attrs: Mapping[str, str | float] = field(default_factory=dict)
+    surface: np.ndarray | None = None
 
     @property
     def shape(self) -> tuple[int, int]:

@@ -10,7 +10,7 @@ import numpy as np
 from pbrdf.errors import PbrdfError
 from pbrdf.rendering.picture import StokesPicture
 
-__all__ = ["render_stokes"]
+__all__ = ["central_rays", "render_stokes"]
 
 #: Samples of one pass, which bounds the memory, and passes that suffice for standard errors.
 _PASS_SAMPLES = 1 << 22
@@ -88,7 +88,25 @@ def render_stokes(
     std = np.full_like(mean, np.nan)
     if len(sizes) > 1:
         std = np.sqrt(squares / (len(sizes) - 1) / taken)
-    return StokesPicture(mean, std, {"spp": float(spp), "depth": float(depth), "seed": float(seed)})
+    surface = np.array(scene.ray_test(central_rays(scene))).reshape(rows, columns)
+    return StokesPicture(
+        mean, std, {"spp": float(spp), "depth": float(depth), "seed": float(seed)}, surface=surface
+    )
+
+
+def central_rays(scene: Any) -> Any:
+    """The rays of the first camera of a scene through the middles of its pixels, row by row."""
+    import drjit as dr
+    import mitsuba as mi
+
+    sensor = scene.sensors()[0]
+    columns, rows = (int(n) for n in sensor.film().crop_size())
+    index = dr.arange(mi.UInt32, rows * columns)
+    centre = mi.Point2f(
+        (mi.Float(index % columns) + 0.5) / columns,
+        (mi.Float(index // columns) + 0.5) / rows,
+    )
+    return sensor.sample_ray(0.0, 0.5, centre, mi.Point2f(0.5))[0]
 
 
 def _pass_sizes(spp: int, pixels: int) -> list[int]:

@@ -160,7 +160,7 @@ def _panels(bsdfs: Sequence[Any], aspect: float) -> Subject:
     )
 
 
-def _car(bsdfs: Sequence[Any], aspect: float) -> Subject:
+def _fender(bsdfs: Sequence[Any], aspect: float) -> Subject:
     import mitsuba as mi
 
     from pbrdf.rendering.meshes import WHEEL_CENTRE, WHEEL_RADIUS, body_panel, hills
@@ -206,7 +206,7 @@ def _car(bsdfs: Sequence[Any], aspect: float) -> Subject:
 SCENES: dict[str, Callable[[Sequence[Any], float], Subject]] = {
     "sphere": _spheres,
     "plate": _panels,
-    "car": _car,
+    "fender": _fender,
 }
 #: More objects than this in a row are too small to be looked at.
 _MOST_OBJECTS = 12
@@ -218,9 +218,9 @@ def subject(name: str, bsdfs: Sequence[Any], aspect: float = 1.0) -> Subject:
     Parameters
     ----------
     name
-        ``sphere``, ``plate`` or ``car``.
+        ``sphere``, ``plate`` or ``fender``.
     bsdfs
-        Coats of paint as entries of a Mitsuba scene: one object (on the car: one piece of the body) for each.
+        Coats of paint as entries of a Mitsuba scene: one object (on the fender: one piece of the body) for each.
     aspect
         Width of the picture over its height.
 
@@ -230,7 +230,10 @@ def subject(name: str, bsdfs: Sequence[Any], aspect: float = 1.0) -> Subject:
         If there is no such scene, no coat, or there are more coats than the scene has room for.
     """
     if name not in SCENES:
-        raise PbrdfError(f"scene {name!r}: choose {', '.join(SCENES)}, or give a Mitsuba scene FILE.xml")
+        hint = "; it shows a fender, and is called so" if name == "car" else ""
+        raise PbrdfError(
+            f"scene {name!r}: choose {', '.join(SCENES)}, or give a Mitsuba scene FILE.xml{hint}"
+        )
     if not 1 <= len(bsdfs) <= _MOST_OBJECTS:
         raise PbrdfError(f"the scene {name} takes 1 to {_MOST_OBJECTS} models, not {len(bsdfs)}")
     return SCENES[name](bsdfs, aspect)

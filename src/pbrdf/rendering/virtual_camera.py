@@ -21,6 +21,7 @@ from pbrdf.instruments.polarimeter.instrument import Instrument
 from pbrdf.instruments.reduction.stokes_image import StokesImage
 from pbrdf.instruments.reduction.surface_axes import to_surface_axes
 from pbrdf.rendering.picture import StokesPicture
+from pbrdf.rendering.render import central_rays
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -67,12 +68,7 @@ def pixel_geometry(scene: Any, lamp: Sequence[float]) -> PixelGeometry:
 
     sensor = scene.sensors()[0]
     columns, rows = (int(n) for n in sensor.film().crop_size())
-    index = dr.arange(mi.UInt32, rows * columns)
-    centre = mi.Point2f(
-        (mi.Float(index % columns) + 0.5) / columns,
-        (mi.Float(index // columns) + 0.5) / rows,
-    )
-    ray, _ = sensor.sample_ray(0.0, 0.5, centre, mi.Point2f(0.5))
+    ray = central_rays(scene)
     si = scene.ray_intersect(ray)
     target = mi.Point3f([float(c) for c in lamp])
     lit = si.is_valid() & ~scene.ray_test(si.spawn_ray_to(target))

@@ -3,12 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from pbrdf.models.parameters import Parameter
-
-__all__ = ["brief", "per_cent", "plain", "shown_unit", "with_error"]
+__all__ = ["brief", "per_cent", "plain", "with_error"]
 
 #: Error, relative to the value, below which the value is as good as exact: simulated data without noise.
 _EXACT = 1e-9
@@ -59,11 +55,6 @@ def per_cent(share: float) -> str:
         return f"{number:.0e} %".replace("-", "−")
     digits = 0 if abs(number) >= 9.95 or number == 0.0 else 1 - math.floor(math.log10(abs(number)))
     return f"{number:.{max(digits, 0)}f} %"
-
-
-def shown_unit(parameter: Parameter) -> tuple[float, str]:
-    """Factor and unit in which people and files see a parameter: angles in degrees."""
-    return (180.0 / math.pi, "°") if parameter.unit == "rad" else (1.0, parameter.unit)
 
 
 def plain(value: object) -> object:

@@ -71,7 +71,7 @@ def test_the_content_tells_the_format(text_file):
         (1, [9.05e-07, 0.5, 0.5, True, 0.3], "row 2: the exit azimuth is True, not a number"),
         (1, [9.05e-07, 0.5, 10**400, 0.0, 0.3], "row 2: the exit zenith angle is 1000"),
         (1, [9.05e-07, 0.5, None, 0.0, 0.3], "row 2: the exit zenith angle is null"),
-        (1, [9.05e-07, 0.5, 30.0, 0.0, 0.3], "theta_r, row 1: 30 rad"),
+        (1, [9.05e-07, 0.5, 30.0, 0.0, 0.3], "theta_r, index 1: 30 rad"),
     ],
 )
 def test_errors_name_the_row(text_file, row, value, words):

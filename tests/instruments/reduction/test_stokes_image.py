@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from pbrdf.errors import DataError
+from pbrdf.instruments.frames.mosaic import split_mosaic
 from pbrdf.instruments.polarimeter.detector import Detector
 from pbrdf.instruments.polarimeter.polarimeter import (
+    division_of_focal_plane,
     lcvr,
     measured,
     rotating_polarizer,
@@ -105,6 +107,27 @@ def test_frames_that_are_not_numbers_are_dead():
     frames[1, 1] = np.nan
     np.testing.assert_array_equal(flag_pixels(frames, DETECTOR), [0, PixelFlag.DEAD, 0])
     assert np.isnan(reduce_frames(frames, SIX, DETECTOR).stokes[:, 1]).all()
+
+
+@pytest.mark.parametrize("weighted", [True, False])
+def test_dark_subtracted_float_mosaics_keep_their_mean(weighted):
+    """Noise about 0 is neither clipped at 0 nor cut into steps, and a highlight far away changes nothing."""
+    camera = division_of_focal_plane(np.deg2rad([[90, 45], [135, 0]]))
+    detector = Detector(bits=16, gain=1.0, read_noise=1.0)
+    noise = np.random.default_rng(0).normal(0.0, 1.0, (200, 200))
+    noise -= noise.mean()
+    image = reduce_frames(split_mosaic(noise, camera), camera, detector, weighted=weighted)
+    seen = image.stokes[:3]
+    # unweighted I = ½ ΣI has exactly twice the mean of the mosaic's pixels; Q and U are differences of 10 000 pairs
+    assert abs(seen[0].mean()) < (5 / 100 if weighted else 1e-12)
+    assert (abs(seen[1:].mean(axis=(1, 2))) < 5 * np.sqrt(2.0) / 100).all()
+    assert (seen[0] < 0.0).mean() == pytest.approx(0.5, abs=0.03)
+    paint = np.full((8, 8), 0.9)
+    alone = reduce_frames(split_mosaic(paint, camera), camera, detector, weighted=weighted).stokes
+    paint[0, 0] = 60000.0
+    beside = reduce_frames(split_mosaic(paint, camera), camera, detector, weighted=weighted).stokes
+    np.testing.assert_array_equal(beside[:3, 1:, 1:], alone[:3, 1:, 1:])
+    np.testing.assert_allclose(alone[0], 1.8, rtol=1e-12)
 
 
 def test_dark_level():

@@ -161,9 +161,7 @@ def test_one_stated_covariance_for_all_pixels(data):
     assert part["degrees_of_freedom"].values.tolist() == [[38, 38], [59, 59]]
     with pytest.raises(pbrdf.FitError, match=r"covariance has shape \(3, 3\)"):
         pbrdf.fit_map(data, covariance=matrix[0], **FEW)
-    with pytest.raises(
-        pbrdf.FitError, match=r"covariance of geometry 0 is not symmetric and positive definite"
-    ):
+    with pytest.raises(pbrdf.FitError, match=r"covariance at index 0 is not symmetric and positive definite"):
         pbrdf.fit_map(data, covariance=-matrix, **FEW)
 
 
@@ -324,7 +322,7 @@ def test_data_that_allow_no_map(data):
         pbrdf.fit_map(data.rename(U="W"), **FEW)
     with pytest.raises(pbrdf.DataError, match=r"group has the dimensions .* needs 'geometry' alone"):
         pbrdf.fit_map(data.assign_coords(group=data["I"].astype(int)), **FEW)
-    with pytest.raises(pbrdf.DataError, match="theta_i, rows 0, 1"):
+    with pytest.raises(pbrdf.DataError, match="theta_i, indices 0, 1"):
         pbrdf.fit_map(data.assign_coords(theta_i=data["theta_i"] + 1.6), **FEW)
     with pytest.raises(pbrdf.DataError, match="floating-point numbers are needed"):
         pbrdf.fit_map(data.assign(I=data["I"].astype(int)), **FEW)

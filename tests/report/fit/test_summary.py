@@ -19,6 +19,7 @@ from pbrdf.report.fit.summary import (
     summary_text,
     verdict_in_words,
 )
+from pbrdf.report.numbers import brief
 
 
 def test_the_summary_names_everything(report):
@@ -43,6 +44,17 @@ def test_the_summary_names_everything(report):
     estimate = result.estimates["n"]
     assert f"{estimate.value:.4f} ± {estimate.std:.4f}" in text
     assert max(len(line) for line in text.splitlines()) <= 110
+
+
+@pytest.mark.slow
+def test_values_that_are_not_numbers_are_left_out_with_a_word(report):
+    """The number of NaN stands beside the number of values, and nothing is said where there is none."""
+    assert "NaN" not in summary_text(report)
+    dataset = pbrdf.open_experiment("cd-back")
+    dataset["Q"][:20] = np.nan
+    result = pbrdf.fit(dataset, starts=4)
+    text = " ".join(summary_text(Report(result, dataset, "holes")).split())
+    assert "232 measured values of I, Q, U, V (20 more are NaN and left out)" in text
 
 
 def test_the_summary_of_assumed_noise_is_called_relative(hemisphere_report):
@@ -148,6 +160,10 @@ def test_optima_in_words(report):
     assert "9 times the χ² (3 starts)" in optima_in_words(replace(result, optima=result.optima[::2]))[1]
     assert optima_in_words(replace(result, optima=[])) == ["none of 64 starts converged"]
     assert "no other optimum" in optima_in_words(replace(result, optima=result.optima[:1]))[1]
+    alone = replace(result, optima=result.optima[:1], starts=1, converged=1)
+    assert optima_in_words(alone) == [
+        f"the only start reached an optimum (χ² = {brief(result.optima[0].chi2)})"
+    ]
 
 
 def test_dark_geometries_are_blamed_for_a_large_rms(report):

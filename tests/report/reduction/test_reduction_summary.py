@@ -2,6 +2,7 @@
 
 import csv
 import io
+import re
 
 import numpy as np
 import pytest
@@ -29,6 +30,9 @@ def test_numbers_with_their_errors():
     # DoLP 0.1 ± 2/1000 (1 + 0.01)^½, AoLP 0° ± ½ · 2/100 radians; one series needs no column for its name
     assert "1000.0 ± 2.0" in text
     assert "0.1000 ± 0.0020" in text
+    # the error is that of the mean: how much the pixels of a scene differ stands beside it
+    header, numbers = (re.split(r"  +", line.strip()) for line in text.splitlines()[:2])
+    assert numbers[header.index("scatter of I")] == "7"
     assert "0.00 ± 0.57" in text
     assert "only" not in text
     for never in ("saturated", "dead", "dark"):

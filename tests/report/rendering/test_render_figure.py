@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pbrdf.rendering.picture import StokesPicture
-from pbrdf.report.rendering.figure import channel_figure, polarizer_figure, stokes_figure
+from pbrdf.report.rendering.figure import channel_figure, colour_figure, polarizer_figure, stokes_figure
 from pbrdf.report.style import save_figure
 
 
@@ -19,6 +19,7 @@ def picture():
     angle = np.zeros((rows, columns))
     angle[:10, 15:], angle[10:, :15], angle[10:, 15:] = math.pi / 4, math.pi / 2, -math.pi / 4
     stokes[1], stokes[2] = 0.4 * stokes[0] * np.cos(2 * angle), 0.4 * stokes[0] * np.sin(2 * angle)
+    stokes[3] = 0.05 * stokes[0]
     std = np.full_like(stokes, 1e-3)
     std[:, 10:, 15:] = 1.0
     return StokesPicture(stokes, std)
@@ -75,6 +76,34 @@ def test_the_scale_of_dolp_begins_at_0_and_holds_the_values(picture):
     assert 0.4 <= high <= 0.5
 
 
+def test_the_scale_is_that_of_the_surfaces_and_not_of_the_sky(picture):
+    """A sky of 80 % in the upper half, a paint of 10 % below it."""
+    stokes = picture.stokes.copy()
+    stokes[1], stokes[2] = 0.1 * stokes[0], 0.02 * stokes[0]
+    stokes[1, :10] = 0.8 * stokes[0, :10]
+    below = np.zeros(picture.shape, dtype=bool)
+    below[10:] = True
+    seen = StokesPicture(stokes, np.full_like(stokes, 1e-3), surface=below)
+    assert image_of(channel_figure(seen, "dolp", "").axes[0]).get_clim()[1] <= 0.15
+    assert image_of(channel_figure(seen, "s1", "").axes[0]).get_clim()[1] == pytest.approx(0.1)
+    for surface in (None, np.zeros_like(below)):
+        whole = StokesPicture(stokes, seen.std, surface=surface)
+        assert image_of(channel_figure(whole, "dolp", "").axes[0]).get_clim()[1] >= 0.8
+
+
+def test_circular_polarisation_within_the_noise_is_not_shown(picture):
+    noise = np.random.default_rng(0).standard_normal(picture.shape) * picture.std[3]
+    stokes = picture.stokes.copy()
+    stokes[3] = noise
+    axes = channel_figure(StokesPicture(stokes, picture.std), "s3", "").axes[0]
+    assert (
+        "none beyond the noise" in axes.get_title() and np.ma.getmaskarray(image_of(axes).get_array()).all()
+    )
+    stokes[3, 5:8] = 0.1 * stokes[0, 5:8]
+    axes = channel_figure(StokesPicture(stokes, picture.std), "s3", "").axes[0]
+    assert "left circular +" in axes.get_title() and not np.ma.getmaskarray(image_of(axes).get_array()).any()
+
+
 def test_views_through_polarisers_share_a_scale(picture):
     """Crossed polarisers: what one lets through the other stops; both pictures have the same brightness scale."""
     level, upright = (image_of(polarizer_figure(picture, a, "").axes[0]) for a in (0.0, math.pi / 2))
@@ -90,3 +119,15 @@ def test_a_dark_picture_can_be_drawn(channel, tmp_path):
     dark = StokesPicture(np.zeros((4, 5, 6)), np.zeros((4, 5, 6)))
     save_figure(channel_figure(dark, channel, "nothing"), tmp_path / "dark.png")
     assert (tmp_path / "dark.png").stat().st_size > 2000
+
+
+def test_the_longest_wavelength_is_red():
+    pictures = []
+    for nm, brightness in ((450.0, 0.1), (650.0, 1.0), (550.0, 0.5)):
+        stokes = np.zeros((4, 6, 8))
+        stokes[0] = brightness
+        pictures.append(StokesPicture(stokes, np.zeros_like(stokes), {"wavelength": nm}))
+    ax = colour_figure(pictures, "a title").axes[0]
+    red, green, blue = np.asarray(image_of(ax).get_array())[0, 0]
+    assert red == 1.0 and red > green > blue
+    assert "650 nm, 550 nm, 450 nm as red, green, blue" in ax.get_title()

@@ -24,7 +24,7 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from pbrdf.data.build import assemble
-from pbrdf.data.conventions import mueller_flip_v, mueller_swap_sp
+from pbrdf.data.convert import from_mitsuba_mueller
 from pbrdf.data.formats.declaration import Reader
 from pbrdf.data.formats.tensor_file import is_tensor_file, read_tensors, write_tensors
 from pbrdf.data.formats.thinning import thinning, thinning_in_words
@@ -77,14 +77,15 @@ def mueller_to_pbsdf(
     theta_h, theta_d, phi_d
         Radians, shape (...).
     """
-    return mueller_flip_v(mueller_swap_sp(to_scattering_plane(mueller, theta_h, theta_d, phi_d)))
+    # its own inverse
+    return from_mitsuba_mueller(to_scattering_plane(mueller, theta_h, theta_d, phi_d))
 
 
 def mueller_from_pbsdf(
     mueller: ArrayLike, theta_h: ArrayLike, theta_d: ArrayLike, phi_d: ArrayLike
 ) -> NDArray[np.float64]:
     """Inverse of :func:`mueller_to_pbsdf`."""
-    return from_scattering_plane(mueller_flip_v(mueller_swap_sp(mueller)), theta_h, theta_d, phi_d)
+    return from_scattering_plane(from_mitsuba_mueller(mueller), theta_h, theta_d, phi_d)
 
 
 @dataclass(frozen=True)

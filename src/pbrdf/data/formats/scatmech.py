@@ -18,7 +18,8 @@ import numpy as np
 import xarray as xr
 
 from pbrdf.data.build import assemble
-from pbrdf.data.conventions import mueller_from_scatmech, mueller_xyxy_to_sp
+from pbrdf.data.conventions import mueller_xyxy_to_sp
+from pbrdf.data.convert import from_scatmech_mueller
 from pbrdf.data.formats.declaration import Reader
 from pbrdf.data.select import match_wavelengths
 from pbrdf.data.validation import validate
@@ -83,7 +84,7 @@ def read_scatmech(path: str | Path, *, wavelength: float | Sequence[float] | Non
     phi = np.deg2rad(columns["phir"])
     elements = [np.ones_like(phi), *(columns[f"m{i}{j}"] for i, j in _INDICES[1:])]
     normalized = np.stack(elements, axis=-1).reshape(-1, 4, 4)
-    mueller = mueller_from_scatmech(mueller_xyxy_to_sp(normalized, phi))
+    mueller = from_scatmech_mueller(mueller_xyxy_to_sp(normalized, phi))
     ds = assemble(
         {
             "theta_i": np.deg2rad(-columns["thetai"]),

@@ -28,6 +28,7 @@ from pbrdf.data.schema import (
     VARIABLES,
     std_name,
     variable_units,
+    with_group,
 )
 from pbrdf.data.validation import validate
 from pbrdf.errors import DataError
@@ -70,7 +71,7 @@ def from_stored(stored: xr.Dataset, path: Path) -> xr.Dataset:
         them.
     """
     require_no_pixels(stored, path)
-    ds = _understood(stored, path)
+    ds = with_group(_understood(_listed(stored), path))
     validate(ds, origin=str(path))
     return ds
 
@@ -100,6 +101,22 @@ def require_no_pictures(stored: xr.Dataset, path: Path) -> None:
             "a model to each, and `pbrdf identify` takes that map; pbrdf.map_dataset makes data of them, for "
             "pbrdf.identify_map and pbrdf.fit_map; `pbrdf reduce --angles … --roi …` writes a data set of a region"
         )
+
+
+def _listed(stored: xr.Dataset) -> xr.Dataset:
+    """Data over a grid, with dimensions for angles (and wavelengths), as a list of them; other content as it is."""
+    angles = ("theta_i", "theta_r", "phi")
+    axes = [name for name in COORDINATES if name in stored.dims and name in stored.coords]
+    if DIMENSION in stored.dims or not set(axes) & set(angles) or not set(angles) <= set(stored.coords):
+        return stored
+    listed = stored.stack({DIMENSION: axes}, create_index=False).transpose(DIMENSION, ...)
+    count = listed.sizes[DIMENSION]
+    alone = {
+        name: ((DIMENSION,), np.full(count, listed[name].values), listed[name].attrs)
+        for name in COORDINATES
+        if name in listed.coords and not listed[name].dims
+    }
+    return listed.assign_coords(alone)
 
 
 def _measured_dims(stored: xr.Dataset) -> set[str]:
@@ -186,7 +203,7 @@ def to_stored(ds: xr.Dataset) -> xr.Dataset:
         If `ds` does not follow the schema.
     """
     validate(ds)
-    stored = ds.copy()
+    stored = with_group(ds).copy()
     for name in ANGLES:
         if name in ds.variables:
             degrees = exact_degrees(ds[name].values)

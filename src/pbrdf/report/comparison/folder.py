@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 from pbrdf.files.atomic import atomic_folder
 from pbrdf.inversion.model_comparison import Comparison, Contender
+from pbrdf.models.parameters import shown_unit
 from pbrdf.report.comparison.page import page_text
 from pbrdf.report.comparison.subject import Compared
 from pbrdf.report.comparison.summary import summary_text
-from pbrdf.report.numbers import plain, shown_unit
+from pbrdf.report.numbers import plain
 from pbrdf.version import __version__
 
 if TYPE_CHECKING:

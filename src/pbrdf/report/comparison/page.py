@@ -7,10 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pbrdf.inversion.model_comparison import DESCRIBES, IN_PART, Comparison
+from pbrdf.models.parameters import shown_unit
 from pbrdf.report.comparison.subject import Compared, share
 from pbrdf.report.comparison.subject import table as ranking_table
 from pbrdf.report.dataset.describe import cautions, columns_in_words, describe
-from pbrdf.report.numbers import brief, per_cent, shown_unit, with_error
+from pbrdf.report.numbers import brief, per_cent, with_error
 from pbrdf.report.page import (
     Section,
     bullets,

@@ -12,7 +12,7 @@ import numpy as np
 
 from pbrdf.data.covariance import correlations
 from pbrdf.data.origin import origin_of
-from pbrdf.data.schema import COVARIANCE, NATURAL_LIGHT, NORMALISED, only_ratios, written
+from pbrdf.data.schema import COVARIANCE, NATURAL_LIGHT, NORMALISED, only_ratios, with_group, written
 from pbrdf.data.select import measured_channels
 from pbrdf.errors import visible
 
@@ -43,7 +43,7 @@ def describe(ds: xr.Dataset) -> list[str]:
     lines = [visible(" ".join(str(ds.attrs["title"]).split()))] if ds.attrs.get("title") else []
     channels = measured_channels(ds)
     uncertain = [name for name in channels if f"{name}_std" in ds.data_vars]
-    groups = np.unique(ds["group"].values)
+    groups = np.unique(with_group(ds)["group"].values)
     lines.append(
         f"{ds.sizes['geometry']} geometries in {len(groups)} group{'s' if len(groups) > 1 else ''} "
         f"({_listed([str(g) for g in groups])}); {wavelengths_in_words(ds)}"

@@ -10,7 +10,7 @@ import numpy as np
 
 from pbrdf.data.conventions import qu_from_dolp_aolp
 from pbrdf.data.covariance import correlations
-from pbrdf.data.schema import COVARIANCE
+from pbrdf.data.schema import COVARIANCE, with_group
 from pbrdf.data.select import to_brdf_scale
 from pbrdf.report.dataset.quantities import Channel, polarised_quantities
 
@@ -93,7 +93,7 @@ class Points:
             theta_i=np.rad2deg(ds["theta_i"].values),
             theta_r=np.rad2deg(ds["theta_r"].values),
             phi=180.0 - (180.0 - phi) % 360.0,
-            group=ds["group"].values.astype(str),
+            group=with_group(ds)["group"].values.astype(str),
             intensity=Channel(stokes[0], std[0]),
             dolp=dolp,
             arbitrary_scale=ds.attrs.get("scale") == "arbitrary",

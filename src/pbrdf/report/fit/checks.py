@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from pbrdf.inversion.conventions_check import contradicted_conventions, misfit
 from pbrdf.inversion.suggestions import Suggestion, suggestions
 from pbrdf.inversion.verdict import Level
-from pbrdf.report.numbers import shown_unit
+from pbrdf.models.parameters import shown_unit
 
 if TYPE_CHECKING:
     import xarray as xr

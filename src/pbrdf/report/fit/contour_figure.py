@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from pbrdf.models.parameters import shown_unit
 from pbrdf.report.dataset.describe import short_name
-from pbrdf.report.numbers import brief, shown_unit
+from pbrdf.report.numbers import brief
 from pbrdf.report.style import BLUE, GREY, panels, styled
 
 if TYPE_CHECKING:

@@ -15,10 +15,11 @@ from pbrdf.errors import PbrdfError
 from pbrdf.files.atomic import atomic_folder
 from pbrdf.files.netcdf_files import write_netcdf_file
 from pbrdf.inversion.stored_result import FILE_NAME, write_result
+from pbrdf.models.parameters import shown_unit
 from pbrdf.report.fit.page import page_text
 from pbrdf.report.fit.subject import Report
 from pbrdf.report.fit.summary import summary_text
-from pbrdf.report.numbers import plain, shown_unit
+from pbrdf.report.numbers import plain
 from pbrdf.report.page import figure as framed
 from pbrdf.report.style import FIGURE_FORMATS
 from pbrdf.version import __version__

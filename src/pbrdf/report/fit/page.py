@@ -13,6 +13,7 @@ from pbrdf.data.schema import written
 from pbrdf.inversion.erroranalysis import ErrorStatistics, error_analysis
 from pbrdf.inversion.holdout import Prediction
 from pbrdf.inversion.verdict import Verdict
+from pbrdf.models.parameters import shown_unit
 from pbrdf.report.dataset.describe import cautions, columns_in_words, describe
 from pbrdf.report.fit.subject import Report
 from pbrdf.report.fit.summary import (
@@ -21,7 +22,7 @@ from pbrdf.report.fit.summary import (
     optima_in_words,
     verdict_in_words,
 )
-from pbrdf.report.numbers import brief, per_cent, shown_unit, with_error
+from pbrdf.report.numbers import brief, per_cent, with_error
 from pbrdf.report.page import (
     Section,
     bullets,

@@ -78,7 +78,8 @@ def pictures(report: Report) -> Iterator[Picture]:
     yield Picture(
         "starts",
         starts_figure(report),
-        f"Where each of {result.starts} starts of the search began and ended, a panel for each free parameter.",
+        f"Where {'the only start' if result.starts == 1 else f'each of {result.starts} starts'} of the search began "
+        "and ended, a panel for each free parameter.",
         "Lines that end in one point agree; those that end elsewhere found another optimum, or none.",
     )
     if report.checks is not None and report.checks.contours:

@@ -11,12 +11,13 @@ from pbrdf.files.atomic import require_writable_folder
 from pbrdf.inversion.estimates import Estimate
 from pbrdf.inversion.holdout import Prediction
 from pbrdf.inversion.result import FitResult
+from pbrdf.models.parameters import shown_unit
 from pbrdf.report.fit.checks import run_checks
 from pbrdf.report.fit.figure import fit_figure
 from pbrdf.report.fit.folder import parse_formats, write_report
 from pbrdf.report.fit.subject import Report
 from pbrdf.report.fit.summary import summary_text, verdict_in_words
-from pbrdf.report.numbers import brief, per_cent, shown_unit, with_error
+from pbrdf.report.numbers import brief, per_cent, with_error
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

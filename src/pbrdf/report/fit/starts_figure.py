@@ -38,7 +38,7 @@ def starts_figure(report: Report) -> Figure:
         {"color": BLUE, "linestyle": "-", "label": f"reached the best optimum ({best.sum()})"},
         {"color": RED, "linestyle": "--", "label": f"ended elsewhere ({(~best).sum()})"},
     ]
-    title = f"{len(best)} starts of the fit to {short_name(report.name, report.dataset)}"
+    title = f"{len(best)} start{'s' if len(best) > 1 else ''} of the fit to {short_name(report.name, report.dataset)}"
     with styled():
         from matplotlib.lines import Line2D
         from matplotlib.ticker import FuncFormatter

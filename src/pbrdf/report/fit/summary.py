@@ -14,6 +14,7 @@ from pbrdf.inversion.comparison import NEAR_SPECULAR, near_specular_tilt
 from pbrdf.inversion.estimates import Estimate
 from pbrdf.inversion.result import FitResult
 from pbrdf.inversion.verdict import Verdict
+from pbrdf.models.parameters import shown_unit
 from pbrdf.report.dataset.describe import (
     cautions,
     columns_in_words,
@@ -21,7 +22,7 @@ from pbrdf.report.dataset.describe import (
     wavelengths_in_words,
 )
 from pbrdf.report.fit.subject import Report
-from pbrdf.report.numbers import brief, per_cent, shown_unit, with_error
+from pbrdf.report.numbers import brief, per_cent, with_error
 from pbrdf.report.printing import bare_table, print_parts, printing_console
 
 if TYPE_CHECKING:
@@ -193,8 +194,11 @@ def _heading(report: Report) -> list[tuple[str, list[str]]]:
     options = [f"{k}={v}" for k, v in model.chosen.items() if v != model.options[k][0]]
     title = ds.attrs.get("title")
     count = f"{total - held} of {total} geometries" if held else f"{total} geometries"
+    fitted = result.data
+    missing = fitted.std.size - fitted.count - fitted.unstated
+    left_out = f" ({missing} more are NaN and left out)" if missing else ""
     data = (
-        f"{count}, {result.goodness.data} measured values of {_channels(result)}; "
+        f"{count}, {result.goodness.data} measured values of {_channels(result)}{left_out}; "
         f"{wavelengths_in_words(ds)}, {illumination_in_words(ds)}"
     )
     rows = [
@@ -380,11 +384,15 @@ def _r_squared(value: float) -> str:
 
 def optima_in_words(result: FitResult) -> list[str]:
     """How many starts reached the best optimum, and what the next best is."""
+    alone = result.starts == 1
     if not result.optima:
-        return [f"none of {result.starts} starts converged"]
+        return ["the only start has not converged" if alone else f"none of {result.starts} starts converged"]
     best, *others = result.optima
     lines = [f"{best.count} of {result.starts} starts reached the best optimum (χ² = {brief(best.chi2)})"]
-    if not result.settled:
+    if alone:
+        ended = "reached an optimum" if result.settled else "has not converged"
+        lines = [f"the only start {ended} (χ² = {brief(best.chi2)})"]
+    elif not result.settled:
         lines = [f"the best of {result.starts} starts (χ² = {brief(best.chi2)}) has not converged"]
     if others:
         second = others[0]
@@ -398,10 +406,10 @@ def optima_in_words(result: FitResult) -> list[str]:
         lines.append(
             f"the next best has {worse} ({second.count} start{'s' if second.count > 1 else ''}): {values}"
         )
-    else:
+    elif not alone:
         lines.append("no other optimum was found")
-    if result.converged < result.starts:
-        lines.append(f"{result.starts - result.converged} starts did not converge")
+    if (missed := result.starts - result.converged) and not alone:
+        lines.append(f"{missed} start{'s' if missed > 1 else ''} did not converge")
     return lines
 
 

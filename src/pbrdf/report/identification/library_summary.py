@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pbrdf.report.numbers import brief, per_cent, shown_unit
+from pbrdf.models.parameters import shown_unit
+from pbrdf.report.numbers import brief, per_cent
 from pbrdf.report.printing import bare_table, plain_table, print_parts
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ import numpy as np
 
 from pbrdf.identification.fitted_parameters import FittedParameters
 from pbrdf.identification.identify import Identification
-from pbrdf.report.numbers import shown_unit
+from pbrdf.models.parameters import shown_unit
 from pbrdf.report.style import BLUE, GREY, RED, new_figure, styled
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pbrdf.errors import DataError
-from pbrdf.report.numbers import shown_unit
+from pbrdf.models.parameters import shown_unit
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -74,7 +74,11 @@ def _cells(series: str, region: str, average: RegionAverage) -> dict[str, str]:
 def print_averages(
     averages: Mapping[str, Sequence[RegionAverage]], names: Sequence[str], console: Console
 ) -> None:
-    """Print a table: pixels by what became of them, mean intensity, degree and angle of polarisation."""
+    """Print a table: pixels by what became of them, mean intensity and how much pixels differ in it,
+    degree and angle of polarisation.
+
+    The errors are those of the means; the scatter is the standard deviation of the pixels about theirs.
+    """
     from rich.table import Table
 
     rows = _rows(averages, names)
@@ -85,12 +89,13 @@ def print_averages(
     kinds = ["good", *(kind for kind in _MASKED if any(average.counts[kind] for _, _, average in rows))]
     for title in ("series", "region") if several else ("region",):
         table.add_column(title, overflow="fold")
-    for title in (*kinds, "mean I", "DoLP", "AoLP, °", *(["DoCP"] if circular else [])):
+    for title in (*kinds, "mean I", "scatter of I", "DoLP", "AoLP, °", *(["DoCP"] if circular else [])):
         table.add_column(title, justify="right", no_wrap=True)
     for series, region, average in rows[:_MOST_ROWS]:
         found = polarization(average.stokes, average.covariance)
         cells = [str(average.counts[kind]) for kind in kinds]
         cells.append(_with_error(average.stokes[0], np.sqrt(average.covariance[0, 0])))
+        cells.append(f"{average.scatter[0]:.2g}" if np.isfinite(average.scatter[0]) else "–")
         cells.append(_with_error(found.dolp, found.dolp_std))
         cells.append(_with_error(np.rad2deg(found.aolp), np.rad2deg(found.aolp_std)))
         if circular:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,13 +16,17 @@ if TYPE_CHECKING:
 
     from pbrdf.rendering.picture import StokesPicture
 
-__all__ = ["channel_figure", "polarizer_figure", "stokes_figure"]
+__all__ = ["channel_figure", "colour_figure", "polarizer_figure", "stokes_figure"]
 
 #: Exponent with which radiances are shown, as on a screen; a few brightest pixels are left to saturate.
 _GAMMA, _BRIGHTEST = 1.0 / 2.2, 99.5
 #: Where the linear polarisation is no more than so many standard errors its angle means nothing.
 _SIGNIFICANT = 3.0
 _NO_ANGLE = "#9A9A9A"
+#: With standard errors from 16 passes one pixel in a hundred is beyond these by chance.
+_CHANCE = 0.03
+#: Of S3 over S0: single precision.
+_ROUNDING = 1e-5
 #: Inches of the longer side of a picture by itself, and of one among others.
 _LARGE, _SMALL = 5.6, 3.4
 _CHANNELS = ("s0", "dolp", "aolp", "s1", "s2", "s3")
@@ -72,6 +77,33 @@ def stokes_figure(picture: StokesPicture, title: str) -> Figure:
         return figure
 
 
+def colour_figure(pictures: Sequence[StokesPicture], title: str) -> Figure:
+    """Three pictures of one scene as red, green and blue, the longest wavelength red, on one scale of radiance.
+
+    Parameters
+    ----------
+    pictures
+        With the attribute ``wavelength``, in any order.
+    title
+        What they show.
+    """
+    ordered = sorted(pictures, key=lambda picture: float(picture.attrs["wavelength"]), reverse=True)
+    radiance = np.stack([picture.stokes[0] for picture in ordered], axis=-1)
+    with styled():
+        width, height = _size(ordered[0], _LARGE)
+        figure = new_figure(width + 0.4, height + 0.8)
+        ax = figure.subplots()
+        ax.imshow(
+            np.clip(np.nan_to_num(radiance) / _brightest(radiance), 0.0, 1.0) ** _GAMMA,
+            interpolation="nearest",
+        )
+        _bare(ax)
+        shown = ", ".join(f"{float(picture.attrs['wavelength']):g} nm" for picture in ordered)
+        ax.set_title(f"radiance S0 at {shown} as red, green, blue", fontsize=9.5)
+        figure.suptitle(title, fontsize=10.5)
+        return figure
+
+
 def _size(picture: StokesPicture, longer: float) -> tuple[float, float]:
     rows, columns = picture.shape
     scale = longer / max(rows, columns)
@@ -84,10 +116,9 @@ def _draw(figure: Figure, ax: Axes, picture: StokesPicture, channel: str) -> Non
         ax.set_title("intensity")
     elif channel == "dolp":
         dolp = np.where(picture.stokes[0] > 0.0, picture.dolp, np.nan)
-        known = dolp[np.isfinite(dolp)]
-        highest = float(np.percentile(known, _BRIGHTEST)) if known.size else 1.0
-        top = min(1.0, max(0.05, math.ceil(highest * 20.0) / 20.0))
-        _image(figure, ax, dolp, "degree of linear polarisation", cmap="viridis", vmin=0.0, vmax=top)
+        top = min(1.0, max(0.05, math.ceil(_highest(picture, dolp) * 20.0) / 20.0))
+        extend = "max" if np.nanmax(dolp, initial=0.0) > top else "neither"
+        _image(figure, ax, dolp, "degree of linear polarisation", extend, cmap="viridis", vmin=0.0, vmax=top)
         ax.set_title("DoLP")
     elif channel == "aolp":
         _angle(figure, ax, picture)
@@ -95,11 +126,33 @@ def _draw(figure: Figure, ax: Axes, picture: StokesPicture, channel: str) -> Non
         number = int(channel[1])
         with np.errstate(divide="ignore", invalid="ignore"):
             ratio = np.where(picture.stokes[0] > 0.0, picture.stokes[number] / picture.stokes[0], np.nan)
-        known = np.abs(ratio[np.isfinite(ratio)])
-        top = max(float(np.percentile(known, _BRIGHTEST)), 0.01) if known.size else 1.0
+        top = max(_highest(picture, np.abs(ratio)), 0.01)
         meaning = {1: "horizontal +, vertical −", 2: "+45° +, −45° −", 3: "left circular +, right −"}[number]
-        _image(figure, ax, ratio, f"S{number} / S0", cmap="RdBu_r", vmin=-top, vmax=top)
+        if number == 3 and _is_noise(picture):
+            ratio = np.full_like(ratio, np.nan)
+            meaning = "none beyond the noise"
+        extend = "both" if np.nanmax(np.abs(ratio), initial=0.0) > top else "neither"
+        _image(figure, ax, ratio, f"S{number} / S0", extend, cmap="RdBu_r", vmin=-top, vmax=top)
         ax.set_title(f"S{number} / S0: {meaning}", fontsize=9.5)
+
+
+def _highest(picture: StokesPicture, values: np.ndarray) -> float:
+    """Where a scale of values of 0 and more ends: nearly all surfaces are within it, the sky behind them may not be."""
+    known = values[np.isfinite(values) & (True if picture.surface is None else picture.surface)]
+    if not known.size:
+        known = values[np.isfinite(values)]
+    return float(np.percentile(known, _BRIGHTEST)) if known.size else 1.0
+
+
+def _is_noise(picture: StokesPicture) -> bool:
+    """Whether there is no circular polarisation but by chance: dielectrics make none of linear light."""
+    known = np.isfinite(picture.std[3]) & (picture.stokes[0] > 0.0)
+    if not known.any():
+        return False
+    beyond = np.abs(picture.stokes[3]) > np.maximum(
+        _SIGNIFICANT * picture.std[3], _ROUNDING * picture.stokes[0]
+    )
+    return float(beyond[known].mean()) < _CHANCE
 
 
 def _brightest(radiance: np.ndarray) -> float:

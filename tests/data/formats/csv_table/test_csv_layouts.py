@@ -88,3 +88,13 @@ def test_a_bad_cell_of_a_long_table_is_named(text_file, bad):
     rows[1234] = f"30;20;{bad}"
     with pytest.raises(DataError, match=rf"line 1236, column 'brdf': '{bad}' is not a number"):
         read(text_file("theta_i;theta_r;brdf\n" + "\n".join(rows) + "\n"))
+
+
+@pytest.mark.parametrize("remark", ["# red paint, 3 May, 550 nm, lab 2", "% red paint, second, try, today"])
+def test_a_remark_taken_for_names_is_said_to_be_one(tmp_path, remark):
+    path = tmp_path / "bare.csv"
+    path.write_text(f"{remark}\n30,30,0,0.1\n30,40,0,0.2\n")
+    with pytest.raises(
+        DataError, match=r"columns are red paint, .*, by the comment in line 1; if that is a remark"
+    ):
+        read(path)

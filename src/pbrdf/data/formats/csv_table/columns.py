@@ -403,12 +403,18 @@ class _Resolution:
             if name.variable == "theta_i" and not name.uncertainty:
                 # the mirror configuration: one angle for both
                 self.columns["theta_i"] = replace(viewer, variable="theta_i")
+        # a remark with as many words as there are columns may pass for their names
+        remark = (
+            f", by the comment in line {self.table.names_line}; if that is a remark, put names above the numbers"
+            if self.table.names_in_comment
+            else ""
+        )
         for variable in ("theta_i", "theta_r"):
             if variable not in self.columns:
                 raise DataError(
                     f"{self.path}: there is no column {variable}; name it with column={{{variable!r}: …}}"
                     f"{', that of theta_i for the mirror direction' if variable == 'theta_r' else ''}. "
-                    f"The columns are {', '.join(self.table.names)}"
+                    f"The columns are {', '.join(self.table.names)}{remark}"
                 )
         self._small_letters()
         name = self.columns["I"].name if "I" in self.columns else Name("")

@@ -14,7 +14,7 @@ from pbrdf.data.degrees import exact_degrees
 from pbrdf.data.formats.attributes import encode_attribute, plain_attributes
 from pbrdf.data.formats.csv_table.columns import COVARIANCES, ELEMENTS
 from pbrdf.data.formats.csv_table.ratios import RATIO_ELEMENTS
-from pbrdf.data.schema import COVARIANCE, NATURAL_LIGHT, VARIABLES, std_name
+from pbrdf.data.schema import COVARIANCE, NATURAL_LIGHT, VARIABLES, std_name, with_group
 from pbrdf.data.validation import validate
 from pbrdf.files.delimited import table_text, write_table
 from pbrdf.optics.stokes import STOKES
@@ -53,6 +53,7 @@ def csv_text(ds: xr.Dataset) -> str:
 def _parts(ds: xr.Dataset) -> tuple[dict[str, list[str]], dict[str, str]]:
     """Cells by the names of the columns, and what is stated above."""
     validate(ds)
+    ds = with_group(ds)
     header = {"azimuth": "forward=0", "stokes": "p-s"}
     for name, value in plain_attributes(ds.attrs).items():
         if name == "illumination":

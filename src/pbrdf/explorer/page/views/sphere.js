@@ -299,7 +299,8 @@ VIEWS.push({
         const angle = Math.atan2(u, q) / 2 * 180 / Math.PI;
         const name = fields.length > 1 ? `${header.models[i]}: ` : "";
         if (L <= 0) return `${name}in the shadow`;
-        const dolp = written(100 * Math.hypot(q, u)), aolp = written(Number(angle.toFixed(1)));
+        const dolp = written(100 * Math.hypot(q, u)), rounded = Number(angle.toFixed(1));
+        const aolp = written(rounded === -90 ? 90 : rounded);
         return `${name}${written(L)} sr⁻¹, DoLP ${dolp} %, AoLP ${aolp}°, V/I ${written(100 * v)} %`;
       }).join("; ");
     }

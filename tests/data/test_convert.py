@@ -1,0 +1,163 @@
+"""What other programs gave (``scripts/make_convention_numbers.py``), converted, is what our formulas say.
+
+Each test states the signs in words. The numbers are those of katsu 0.1.0, polanalyser 3.0.0, pypolar 1.2.0,
+pyElli 0.23.1, pySCATMECH 0.1.10 and Mitsuba 3.9.1 (single precision).
+"""
+
+from __future__ import annotations
+
+import csv
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+import independent as ref
+import pbrdf
+from pbrdf.data import convert
+from pbrdf.errors import DataError
+from pbrdf.optics.elements import diattenuator, retarder
+
+TABLE = Path(__file__).parents[1] / "data_oracle" / "conventions.csv"
+NAMES = {"pySCATMECH": "scatmech", "pyElli": "pyelli"}
+#: Programs with polarisers and retarders, and what to add to their angles, degrees: 90 where their x is s of ours.
+TURN = {"katsu": 0.0, "polanalyser": 0.0, "pypolar": 0.0, "pySCATMECH": 90.0, "mitsuba": 90.0}
+FLAT = ("pypolar", "pyElli", "mitsuba")
+CONVERSIONS = sorted(set(convert.PROGRAMS) - {"pyelli"})
+
+
+def rows(program, what):
+    """Known numbers and matrices of a program."""
+    with TABLE.open(newline="", encoding="utf-8") as file:
+        found = [r for r in csv.DictReader(file) if (r["program"], r["what"]) == (program, what)]
+    assert found
+    known = {
+        key: np.array([float(r[key] or "nan") for r in found])
+        for key in ("angle", "retardance", "n", "kappa", "R")
+    }
+    matrices = np.array([[[float(r[f"m{i}{j}"]) for j in range(4)] for i in range(4)] for r in found])
+    return known, matrices
+
+
+def tolerance(program):
+    return 2e-6 if program == "mitsuba" else 1e-12
+
+
+def reflection(known):
+    """Mueller matrices of flat surfaces in our convention, from the amplitudes for n − iκ."""
+    r_p, r_s = ref.fresnel_r(np.deg2rad(known["angle"]), known["n"] - 1j * known["kappa"])
+    matrix = np.zeros((len(r_p), 4, 4))
+    matrix[:, 0, 0] = matrix[:, 1, 1] = (abs(r_p) ** 2 + abs(r_s) ** 2) / 2
+    matrix[:, 0, 1] = matrix[:, 1, 0] = (abs(r_p) ** 2 - abs(r_s) ** 2) / 2
+    matrix[:, 2, 2] = matrix[:, 3, 3] = (r_p * r_s.conj()).real
+    matrix[:, 3, 2] = (r_p * r_s.conj()).imag
+    matrix[:, 2, 3] = -matrix[:, 3, 2]
+    return matrix
+
+
+@pytest.mark.parametrize("program", TURN)
+def test_polarisers_stand_at_the_same_axis(program):
+    """Angles turn from x towards y everywhere, counterclockwise against the light; x is p of ours, or s."""
+    known, theirs = rows(program, "polariser")
+    ours = diattenuator(np.deg2rad(known["angle"] + TURN[program]))
+    assert_allclose(convert.PROGRAMS[NAMES.get(program, program)](theirs), ours, atol=tolerance(program))
+
+
+@pytest.mark.parametrize("program", TURN)
+def test_retarders_turn_light_to_the_same_hand(program):
+    """Fast axis at the same angle, phase lead positive: V of SCATMECH has our sign, that of the others the opposite."""
+    known, theirs = rows(program, "retarder")
+    ours = retarder(np.deg2rad(known["angle"] + TURN[program]), np.deg2rad(known["retardance"]))
+    assert_allclose(convert.PROGRAMS[NAMES.get(program, program)](theirs), ours, atol=tolerance(program))
+
+
+@pytest.mark.parametrize("program", FLAT)
+def test_flat_surfaces_reflect_alike(program):
+    """Glass on both sides of Brewster's angle and metals on both sides of their principal angle.
+
+    pypolar: Q = I_p − I_s as ours, V reversed. Mitsuba: Q, U and V reversed. pyElli: nothing reversed, but M00 = 1.
+    """
+    known, theirs = rows(program, "reflection")
+    if program == "pyElli":
+        converted = convert.from_pyelli_mueller(theirs, known["R"])
+    else:
+        converted = convert.PROGRAMS[program](theirs)
+    assert_allclose(converted, reflection(known), atol=tolerance(program))
+
+
+#: Signs of Q, U and V by which theirs become ours.
+SIGNS = {
+    "katsu": (1, 1, -1),
+    "polanalyser": (1, 1, -1),
+    "pypolar": (1, 1, -1),
+    "pySCATMECH": (-1, -1, 1),
+    "mitsuba": (-1, -1, -1),
+    "pyElli": (1, 1, 1),
+}
+
+
+@pytest.mark.parametrize("program", SIGNS)
+def test_no_other_signs_fit(program):
+    """With other signs some matrix of the program differs by more than a tenth.
+
+    Of a flat surface alone, all that pyElli gives, U and V turned round together are not seen.
+    """
+    pairs = []
+    if program in TURN:
+        known, theirs = rows(program, "polariser")
+        pairs.append((theirs, diattenuator(np.deg2rad(known["angle"] + TURN[program]))))
+        known, theirs = rows(program, "retarder")
+        angle = np.deg2rad(known["angle"] + TURN[program])
+        pairs.append((theirs, retarder(angle, np.deg2rad(known["retardance"]))))
+    if program in FLAT:
+        known, theirs = rows(program, "reflection")
+        pairs.append((theirs / theirs[:, :1, :1], reflection(known) / reflection(known)[:, :1, :1]))
+    fitting = set()
+    for signs in product((1, -1), repeat=3):
+        D = np.diag([1, *signs])
+        if all(abs(D @ theirs @ D - ours).max() < 0.1 for theirs, ours in pairs):
+            fitting.add(signs)
+    assert fitting == ({SIGNS[program]} if program in TURN else {(1, 1, 1), (1, -1, -1)})
+
+
+@pytest.mark.parametrize("program", CONVERSIONS)
+def test_vectors_convert_with_the_matrices(program):
+    """Converting M and the incident vector converts the outgoing one; twice is nothing."""
+    rng = np.random.default_rng(3)
+    M, S = rng.normal(size=(5, 4, 4)), rng.normal(size=(5, 4))
+    mueller, stokes = convert.PROGRAMS[program], getattr(convert, f"from_{program}_stokes")
+    assert_allclose(np.einsum("nij,nj->ni", mueller(M), stokes(S)), stokes(np.einsum("nij,nj->ni", M, S)))
+    assert_array_equal(mueller(mueller(M)), M)
+
+
+def test_eradiate_is_mitsuba_turned_from_s_to_p():
+    """Its kernel is Mitsuba's; frames with x = p instead of x = s are a quarter of a turn away."""
+    M = np.random.default_rng(4).normal(size=(3, 4, 4))
+    quarter = np.diag([1.0, -1.0, -1.0, 1.0])
+    assert_allclose(convert.from_eradiate_mueller(quarter @ M @ quarter), convert.from_mitsuba_mueller(M))
+
+
+def test_mueller_of_pyelli_has_m00_divided_out():
+    """Without the reflectance it stays a ratio; a matrix with M00 ≠ 1 is not what pyElli gives."""
+    known, theirs = rows("pyElli", "reflection")
+    assert_array_equal(convert.from_pyelli_mueller(theirs), theirs)
+    assert_allclose(convert.from_pyelli_mueller(theirs, known["R"])[:, 0, 0], known["R"], atol=1e-12)
+    with pytest.raises(DataError, match="M00 = 1"):
+        convert.from_pyelli_mueller(0.5 * theirs)
+
+
+def test_index_of_pyelli_has_the_other_sign():
+    """n + iκ there, n − iκ here; what pyElli's solvers do not agree on is refused."""
+    assert_array_equal(convert.from_pyelli_index([1.5 + 0.5j, 1.3]), [1.5 - 0.5j, 1.3])
+    with pytest.raises(DataError, match="conjugate"):
+        convert.from_pyelli_index(1.5 - 0.5j)
+
+
+def test_every_program_has_its_numbers_or_says_so():
+    """The front door leads here; Eradiate alone has no run of its own."""
+    assert pbrdf.convert is convert
+    with TABLE.open(newline="", encoding="utf-8") as file:
+        run = {NAMES.get(r["program"], r["program"]) for r in csv.DictReader(file)}
+    assert set(convert.PROGRAMS) - run == {"eradiate"}
