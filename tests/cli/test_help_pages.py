@@ -35,7 +35,7 @@ SMALLER = {
     "render": "--size 16x16 --spp 16",
     "reduce": "--no-pictures",
 }
-#: What shows a page until it is stopped; what has tests of its own that take minutes; what takes another program's file.
+#: What shows a page until it is stopped, what has slow tests of its own, what takes a file of another program.
 NOT_RUN = {"explore", "reproduce", "demo", "compare-with"}
 
 

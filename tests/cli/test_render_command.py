@@ -211,3 +211,9 @@ def test_a_fit_with_parameters_of_each_wavelength_paints_in_colour(tmp_path):
         painted_with([source], [470.0])
     # without a wavelength it stands for one model as before
     assert len(painted_with([source], [None])[0][1]) == 1
+
+
+def test_an_albedo_is_of_one_wavelength(refused):
+    colours = ("white", "white", "white", "--wavelength", "450,550,650", "--albedo", 0.6)
+    assert "--albedo would make every colour alike" in refused("render", *colours)
+    assert "give a share above 0" in refused("render", "white", "--albedo", 2)

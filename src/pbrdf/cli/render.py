@@ -153,7 +153,7 @@ def render(
 
         if len(colours) > 1:
             raise PbrdfError("--albedo would make every colour alike: leave it or --wavelength out")
-        painted = [(source, [with_albedo(model, albedo) for model in given]) for source, given in painted]
+        painted = [(source, [with_albedo(model, albedo) for model in its]) for source, its in painted]
     for source, models_of_one in painted:
         for model in models_of_one:
             _warn_of_gain(source, model)
