@@ -135,6 +135,23 @@ def test_no_llvm_at_all(monkeypatch):
         backend.get_backend()
 
 
+@pytest.mark.parametrize(
+    ("platform", "said"),
+    [
+        ("linux", ("karellen-llvm-core", "apt install", "libLLVM.so")),
+        ("darwin", ("brew install llvm", "libLLVM.dylib")),
+        ("win32", ("installer", "LLVM-C.dll")),
+        ("freebsd14", ("apt install",)),
+    ],
+)
+def test_what_to_install_is_that_of_the_platform(monkeypatch, platform, said):
+    monkeypatch.setattr(backend, "_too_late", False)
+    monkeypatch.setattr(sys, "platform", platform)
+    hint = backend._hint()
+    assert all(word in hint for word in (*said, "DRJIT_LIBLLVM_PATH", "17 or newer"))
+    assert ("brew" in hint) == (platform == "darwin")
+
+
 def test_importing_pbrdf_does_not_import_drjit():
     """The command line starts fast."""
     run = python("import sys, pbrdf; print('drjit' in sys.modules)")

@@ -52,12 +52,15 @@ MINIMUM_LLVM = 17
 ENVIRONMENT_VARIABLE = "PBRDF_BACKEND"
 LIBRARY_VARIABLE = "DRJIT_LIBLLVM_PATH"
 
-_INSTALL_HINT = (
-    f"Install an LLVM shared library of version {MINIMUM_LLVM} or newer: on Linux x86-64 "
-    "`pip install karellen-llvm-core`; on Debian or Ubuntu `apt install libllvm19`; on macOS "
-    "`brew install llvm`; on Windows the LLVM installer. If it lies in an unusual place, set "
-    "DRJIT_LIBLLVM_PATH to the full path of the shared library."
-)
+#: How LLVM is had, and which file it is where Dr.Jit does not find it by itself.
+_INSTALL = {
+    "linux": (
+        "`pip install karellen-llvm-core` on x86-64, `apt install libllvm19` on Debian or Ubuntu",
+        "libLLVM.so",
+    ),
+    "darwin": ("`brew install llvm`", "$(brew --prefix llvm)/lib/libLLVM.dylib"),
+    "win32": ("the LLVM installer", r"C:\Program Files\LLVM\bin\LLVM-C.dll"),
+}
 
 
 @dataclass(frozen=True)
@@ -239,7 +242,11 @@ def _hint() -> str:
             "Dr.Jit was at work before pbrdf was imported and cannot change its LLVM any more: "
             "start Python again and import pbrdf first"
         )
-    return _INSTALL_HINT
+    how, file = _INSTALL.get(sys.platform, _INSTALL["linux"])
+    return (
+        f"Install an LLVM shared library of version {MINIMUM_LLVM} or newer: {how}. If it is not found then, set "
+        f"{LIBRARY_VARIABLE} to its full path, {file}"
+    )
 
 
 def llvm_version() -> tuple[int, ...] | None:

@@ -120,6 +120,26 @@ def test_points_are_switched_off_by_keyboard_and_a_fit_can_be_undone(served, pag
     assert numbers(stands)[0] == pytest.approx(estimate.value, rel=0.01)
 
 
+def test_a_fit_goes_to_its_own_model_though_others_have_gone(served, page, white):
+    models = [
+        ("other", white.replace(n=1.5)),
+        ("mine", white.replace(n=1.9)),
+        ("third", white.replace(n=2.2)),
+    ]
+    workspace = Workspace(models, [("measured", pbrdf.open_experiment("matte-white-thick"))])
+    state = {**workspace.state(), "active": 1}
+    state["settings"] = {"page": {"views": ["cuts"]}, "fit": {"starts": 1}}
+    workspace.state = lambda: state
+    page.goto(served(lambda: workspace))
+    page.get_by_role("button", name="Fit from here").click()
+    # before the process beside has even been told
+    page.get_by_label("Remove other").click()
+    page.wait_for_selector(".fitting .verdict", timeout=PATIENCE)
+    expect(page.get_by_label("n, number")).not_to_have_value("1.9")
+    page.get_by_label("edit third").check()
+    expect(page.get_by_label("n, number")).to_have_value("2.2")
+
+
 def test_light_follows_the_chosen_line_and_settings_of_other_data_are_given_up(served, page, white):
     theta_i = np.deg2rad(np.repeat([30.0, 60.0], 9))
     s = np.deg2rad(np.tile(np.linspace(-40.0, 40.0, 9), 2))

@@ -2,6 +2,7 @@
 
 import json
 import shlex
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -139,6 +140,14 @@ def test_the_command_of_a_fit_fits_as_the_page_does(state, measured, tmp_path, r
     run(f"{found.command} --no-figures --no-suggestions -o out")
     fitted = pbrdf.load_fit(tmp_path / "out")
     assert fitted.model.values["n"] == n
+
+
+def test_data_of_a_fit_have_no_file_of_that_name(state):
+    dataset = pbrdf.open_experiment("matte-white-thick")
+    workspace = Workspace(datasets=[("paint-fit", dataset)])
+    assert "is a fit" not in made(state, "fit", "", workspace).note
+    workspace.fits.append(("paint-fit", SimpleNamespace(dataset=dataset)))
+    assert "paint-fit is a fit: name the file" in made(state, "fit", "", workspace).note
 
 
 def test_commands_name_paints_as_they_are_and_others_by_their_files(state):

@@ -156,7 +156,8 @@ def test_a_fit_runs_beside_and_cancelling_ends_its_process(page, displaced, whit
     content = content_of(displaced)
     assert page.ask("cancel_fit", content, "error")["text"] == "no fit is running"
     found = page.ask("fit", content, "fitted", "error")
-    assert found["type"] == "fitted" and found["layer"] == 0 and found["model"] == white.name
+    assert found["type"] == "fitted"
+    assert (found["layer"], found["name"], found["model"]) == (0, "white", white.name)
     assert abs(found["values"]["sigma"] - white.values["sigma"]) < 5e-4
     fitting = process_of(page.session.workspace)
     first = fitting.pid

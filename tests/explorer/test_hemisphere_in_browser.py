@@ -9,6 +9,7 @@ import pytest
 import pbrdf
 from pbrdf.explorer.catalogue import catalogue
 from pbrdf.explorer.workspace import Workspace
+from pbrdf.models.registry import find_model
 from pbrdf.optics.stokes import aolp, dolp
 
 pytestmark = pytest.mark.slow
@@ -137,3 +138,17 @@ def test_reading_values_by_keyboard_and_pointer(served, page, white):
     cells.nth(5).click()
     page.get_by_text("m₁₁/m₀₀", exact=True).wait_for()
     assert cells.nth(5).get_attribute("aria-pressed") == "true"
+
+
+def test_where_there_is_no_light_no_number_is_read(served, page):
+    """A surface without body light is black far from its lobe: neither dark nor polarised in numbers."""
+    kind = find_model("priest-germer")
+    mirror = kind.from_values({p.name: p.default for p in kind.parameters})
+    changes = {"settings": {"page": {"views": ["hemisphere"]}, "fit": {"held": 5}, "data": {"off": 5}}}
+    page.goto(served(lambda: Shown([("mirror", mirror)], changes)))
+    board = page.locator(".board")
+    board.locator("canvas").first.wait_for()
+    board.focus()
+    for _ in range(7):
+        page.keyboard.press("Shift+ArrowLeft")
+    assert page.locator(".readout").inner_text() == "θ 70°, φ 180° · no light"

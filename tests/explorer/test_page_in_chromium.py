@@ -231,6 +231,43 @@ def test_a_lost_connection_is_said_and_found_again(served, page, white):
     assert sigma(page) > 0.2
 
 
+def test_what_is_asked_while_there_is_no_connection_is_not_waited_for(served, page, white):
+    sockets, ended = [], False
+
+    def between(socket):
+        sockets.append(socket)
+        if ended:
+            socket.close()
+        else:
+            socket.connect_to_server()
+
+    page.route_web_socket("**/socket*", between)
+    page.goto(served(lambda: Workspace([("thick", white)])))
+    page.wait_for_selector(".card canvas")
+    page.wait_for_function("() => !document.querySelector('.busy.on')")
+    ended = True
+    sockets[0].close()
+    page.get_by_text("does not answer").wait_for()
+    page.locator("input[type=file]").set_input_files(
+        {"name": "mine.csv", "mimeType": "text/csv", "buffer": b"theta_i\n1\n"}
+    )
+    page.get_by_text("mine.csv: not opened").wait_for()
+    page.evaluate("() => [...document.querySelectorAll('.panel')].forEach(panel => { panel.open = true; })")
+    page.get_by_role("button", name="Save", exact=True).click()
+    page.get_by_label("σ, number").fill("0.2")
+    page.get_by_label("σ, number").press("Enter")
+    ended = False
+    page.get_by_text("does not answer").wait_for(state="hidden")
+    page.wait_for_function("() => !document.querySelector('.busy.on')")
+    assert page.get_by_role("button", name="Save", exact=True).is_enabled()
+
+
+def test_a_page_too_many_says_so(page, served, white, monkeypatch):
+    monkeypatch.setattr("pbrdf.explorer.server._MOST_PAGES", 0)
+    page.goto(served(lambda: Workspace([("thick", white)])))
+    page.get_by_text("0 pages are open, close some").wait_for()
+
+
 def test_nothing_is_left_when_the_explorer_goes(opened):
     """In a notebook a cell is run again: the element is empty then, and no listener of the document remains."""
     page = opened("thick")
@@ -333,6 +370,20 @@ def test_axe_finds_no_serious_fault(served, page, white, what):
         papers.add(page.evaluate(f"getComputedStyle({shown}).backgroundColor"))
         assert faults_found(page) == [], (theme, width)
     assert len(papers) == 2
+
+
+def test_an_enlarged_view_is_wider_and_in_sight(served, page, white):
+    page.set_viewport_size({"width": 1700, "height": 900})
+    page.goto(served(lambda: Workspace([("thick", white)])))
+    page.wait_for_selector(".card canvas")
+    stage = page.locator(".stage").bounding_box()
+    for view in ("Hemisphere", "Curves", "Lit ball"):
+        button = page.get_by_role("button", name=f"Enlarge {view}")
+        button.click()
+        card = page.get_by_role("article", name=view).bounding_box()
+        assert card["width"] > 0.9 * stage["width"]
+        assert -1.0 <= card["y"] < 900
+        button.click()
 
 
 def test_from_a_phone_to_a_wall(opened):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pbrdf.explorer import session as session_module
-from pbrdf.explorer.messages import MOST_BUFFERS, MOST_TEXT, unpack
+from pbrdf.explorer.messages import MOST_BUFFERS, MOST_TEXT, pack, unpack
 from pbrdf.explorer.session import Session
 from pbrdf.explorer.workspace import Workspace
 
@@ -147,6 +147,35 @@ def test_requests_that_are_none_are_answered_in_words(page, request_, caplog):
     assert answer["type"] == "error" and answer["text"]
     assert answer["id"] is None
     assert caplog.text == ""
+
+
+@pytest.mark.parametrize("too_much", [{"a": 1e300}, {"a": 1e39}])
+def test_numbers_beyond_measure_end_in_words(page, too_much, caplog):
+    page.state["layers"][0]["parameters"] |= too_much
+    page.state["quantities"] = ["intensity", "dolp", "q", "m11"]
+    views = list(session_module.VIEWS)
+    page.receive({"type": "draw", "id": 1, "views": views, "state": page.state})
+    page.wait()
+    answers = {content["view"]: content for content, _ in page.sent}
+    assert list(answers) == views and answers[views[-1]]["last"]
+    assert "too large to be drawn" in answers["hemisphere"]["error"]
+    assert caplog.text == ""
+
+
+def test_an_answer_that_cannot_be_sent_is_said(white):
+    sent = []
+
+    def send(content, buffers):
+        pack(content, buffers)
+        sent.append(content)
+
+    session = Session(Workspace([("white", white)]), send)
+    picture = {"type": "picture", "id": 4, "view": "one", "last": True}
+    session.emit({**picture, "most": float("inf")}, [])
+    session.emit({"type": "found", "id": 5, "most": float("nan")}, [])
+    session.close()
+    assert sent[0].items() >= picture.items() and "the terminal says more" in sent[0]["error"]
+    assert sent[1]["type"] == "error" and sent[1]["id"] == 5
 
 
 def frame(text, rest=b""):

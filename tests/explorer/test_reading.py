@@ -39,7 +39,15 @@ def test_what_is_left_out_has_its_default():
 
 @pytest.mark.parametrize(
     "state",
-    [None, 3, {"version": 9}, {"version": 1, "layers": []}, {"version": 1, "layers": [{"model": "none"}]}],
+    [
+        None,
+        3,
+        {"version": 9},
+        {"version": 1, "layers": []},
+        {"version": 1, "layers": [{"model": "none"}]},
+        {"version": 1, "layers": [{"model": "priest-germer"}], "quantities": []},
+        {"version": 1, "layers": [{"model": "priest-germer", "parameters": {"n": 10**400}}]},
+    ],
 )
 def test_others_are_refused_by_name(state):
     with pytest.raises(PbrdfError, match=r"^sent\.json: "):

@@ -54,6 +54,15 @@ def test_data_alone_begin_under_a_model(workspace, experiment):
     assert nearest < 2e-3
 
 
+def test_what_was_measured_is_drawn_first(workspace, white):
+    angles = np.deg2rad([[20.0, 40.0], [30.0, 50.0], [0.0, 0.0]])
+    ratios = np.full((2, 4, 4), np.nan)
+    M = white.mueller(*angles)
+    ratios[:, 2, 2], ratios[:, 0, 1] = M[:, 2, 2] / M[:, 0, 0], M[:, 0, 1] / M[:, 0, 0]
+    workspace.add_dataset("ratios", pbrdf.make_dataset(*angles, mueller_over_m00=ratios))
+    assert workspace.state()["quantities"] == ["m01", "m22"]
+
+
 @pytest.mark.slow
 def test_a_fit_brings_its_model_and_its_data(workspace, experiment, tmp_path):
     result = pbrdf.fit(experiment, starts=1)

@@ -237,7 +237,7 @@ class TestErrors:
 
     def test_without_mitsuba(self, monkeypatch):
         monkeypatch.setitem(sys.modules, "mitsuba", None)
-        with pytest.raises(BackendError, match=r"pip install 'mitsuba>=3"):
+        with pytest.raises(BackendError, match=r"pip install 'pbrdf\[render\]'"):
             pbrdf.rendering.register()
 
     def test_an_llvm_that_aborts(self, monkeypatch):

@@ -311,7 +311,7 @@ def with_reading_options(command: Callable[..., None]) -> Callable[..., None]:
         command(reading=Reading(**options), **given)
 
     # typer reads the command line from the signature, which must not be looked up in the wrapped function
-    del run.__wrapped__  # type: ignore[attr-defined]
+    del run.__wrapped__
     run.__signature__ = inspect.Signature([*own, *added])  # type: ignore[attr-defined]
     run.__annotations__ = {p.name: p.annotation for p in (*own, *added)}
     return run

@@ -179,4 +179,5 @@ def _within(values: np.ndarray, text: str, kind: str) -> np.ndarray:
         low, high = (number(end, option) for end in ends)
         return (values >= low - tolerance) & (values <= high + tolerance)
     wanted = np.array([number(part, option) for part in text.split(",")])
-    return (np.abs(values[:, None] - wanted) <= tolerance).any(axis=1)
+    found: np.ndarray = (np.abs(values[:, None] - wanted) <= tolerance).any(axis=1)
+    return found

@@ -72,7 +72,8 @@ def stokes_swap_sp(stokes: ArrayLike) -> NDArray[np.float64]:
     Both frames are right-handed with k, (s, p', k) and (p, s, k) with p' = −p, so one is the other turned by
     90° about the ray: Q and U change sign, V does not.
     """
-    return np.asarray(stokes, dtype=np.float64) * _SWAP_SP
+    values: NDArray[np.float64] = np.asarray(stokes, dtype=np.float64) * _SWAP_SP
+    return values
 
 
 def mueller_swap_sp(mueller: ArrayLike) -> NDArray[np.float64]:
@@ -88,7 +89,8 @@ def aolp_swap_sp(aolp: ArrayLike) -> NDArray[np.float64]:
 
 def stokes_flip_v(stokes: ArrayLike) -> NDArray[np.float64]:
     """Stokes vectors with the other handedness counted as V > 0."""
-    return np.asarray(stokes, dtype=np.float64) * _FLIP_V
+    values: NDArray[np.float64] = np.asarray(stokes, dtype=np.float64) * _FLIP_V
+    return values
 
 
 def mueller_flip_v(mueller: ArrayLike) -> NDArray[np.float64]:

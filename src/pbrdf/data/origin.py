@@ -59,6 +59,7 @@ def origin_of(ds: xr.Dataset) -> Origin | None:
     found = ds.encoding.get(_KEY)
     if found is None:
         return None
+    origin: Origin
     fingerprint, origin = found
     if fingerprint != _fingerprint(ds):
         return replace(origin, lines=(), unused={})

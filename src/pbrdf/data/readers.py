@@ -181,7 +181,8 @@ def write(ds: xr.Dataset, path: str | Path) -> None:
 
 
 def _own(name: str) -> Reader:
-    return importlib.import_module(_OWN[name]).READER
+    found: Reader = importlib.import_module(_OWN[name]).READER
+    return found
 
 
 def _readers() -> Iterator[Reader]:

@@ -118,7 +118,8 @@ def _disagreeing(
         scale = np.broadcast_to(_largest(np.abs(whole), number), spread.shape)
     with np.errstate(invalid="ignore", over="ignore"):
         allowed = np.where(deviation > 0.0, DEVIATIONS * np.sqrt(2.0) * deviation, SHARE * scale)
-        return np.any(spread > allowed, axis=1)
+        found: NDArray[np.bool_] = np.any(spread > allowed, axis=1)
+        return found
 
 
 def _largest(values: NDArray[np.float64], number: NDArray[np.intp]) -> NDArray[np.float64]:

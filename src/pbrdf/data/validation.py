@@ -590,5 +590,6 @@ def _ratio(
 def _or_zero(ds: xr.Dataset, name: str) -> NDArray[np.float64]:
     """Values of a variable, 0 where it is missing or NaN."""
     if name in ds.data_vars:
-        return np.nan_to_num(ds[name].values, nan=0.0)
+        values: NDArray[np.float64] = np.nan_to_num(ds[name].values, nan=0.0)
+        return values
     return np.zeros((ds.sizes[DIMENSION], *(4 for _ in variable_dims(name)[1:])))

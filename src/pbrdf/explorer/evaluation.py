@@ -16,6 +16,7 @@ from __future__ import annotations
 import math
 import threading
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -23,11 +24,12 @@ from typing import Any
 import numpy as np
 
 from pbrdf.backend import get_backend
+from pbrdf.errors import PbrdfError
 from pbrdf.explorer.state import State
 from pbrdf.models.base import Model
 from pbrdf.models.evaluation import kernel_from_angles
 
-__all__ = ["Grid", "Picture", "described", "fields", "mueller_matrix", "prepare"]
+__all__ = ["Grid", "Picture", "described", "fields", "mueller_matrix", "prepare", "require_drawable"]
 
 #: Radiance of unit irradiance and m00, 1/sr, below which there is no light: its logarithm ends and ratios are 0.
 DARK = 1e-20
@@ -200,6 +202,11 @@ def fields(
         Where each quantity is found.
     planes
         float16, shape (planes, zeniths, azimuths).
+
+    Raises
+    ------
+    PbrdfError
+        If they are too large to be drawn.
     """
     import drjit as dr
 
@@ -246,8 +253,21 @@ def fields(
         low2, high2 = sorted(
             sign * end for end in (_extent(packed[place[1]]) if len(place) == 2 else (low, high))
         )
+        require_drawable(low, high, low2, high2)
         pictures.append(Picture(quantity, place[0], place[-1], sign, (min(low, low2), max(high, high2))))
     return pictures, packed
+
+
+def require_drawable(*values: float) -> None:
+    """Refuse what is beyond single precision.
+
+    Raises
+    ------
+    PbrdfError
+        If a value is not finite.
+    """
+    if not all(map(math.isfinite, values)):
+        raise PbrdfError("the numbers are too large to be drawn: choose weaker light, or a smaller amplitude")
 
 
 def _extent(plane: np.ndarray) -> tuple[float, float]:
@@ -336,8 +356,14 @@ def prepare(state: State, quantities: Sequence[str], work: Callable[[], Any]) ->
     if wanted in _compiled:
         return None
     _compiled.add(wanted)
+
+    def quietly() -> None:
+        # what cannot be drawn is said of the picture at rest
+        with suppress(PbrdfError), np.errstate(all="ignore"):
+            work()
+
     # not before the picture at rest is on the screen
-    thread = threading.Timer(_LATER, work)
+    thread = threading.Timer(_LATER, quietly)
     thread.name = "pbrdf compiles"
     thread.start()
     return thread

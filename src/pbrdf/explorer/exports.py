@@ -200,6 +200,8 @@ def _fit(state: State, workspace: Workspace) -> Export:
     if job["hold_out"] is not None:
         words += ["--hold-out", f"{job['hold_out'].kind}={','.join(job['hold_out'].values)}"]
     notes = [*_switched_off(choice), f"save the model file, {file}, beside the data"]
+    if any(result.dataset is choice.measured.whole for _, result in workspace.fits):
+        notes.append(f"{choice.measured.name} is a fit: name the file of its data instead")
     return Export("", "", None, shlex.join([*words, *_selected(choice)]), "; ".join(notes))
 
 

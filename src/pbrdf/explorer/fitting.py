@@ -36,14 +36,14 @@ def answer(request: dict[str, Any], buffers: Any, workspace: Workspace, emit: Em
         return
     state = read_state(request.get("state"))
     job = job_of(state, workspace)
-    layer, model = state.active, state.shown.model.name
+    fitted = {"layer": state.active, "name": state.shown.name, "model": state.shown.model.name}
 
     def tell(message: dict[str, Any]) -> None:
         kind = message.pop("kind")
         if kind == "error":
             emit({"type": "error", "id": number, "about": "fit", "place": _PLACE, **message}, [])
         elif kind == "found":
-            emit({"type": "fitted", "id": number, "layer": layer, "model": model, **message}, [])
+            emit({"type": "fitted", "id": number, **fitted, **message}, [])
         else:
             emit({"type": f"fit_{kind}", "id": number, **message}, [])
 

@@ -12,8 +12,11 @@ import queue
 import threading
 import weakref
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from importlib import import_module
 from typing import Any
+
+import numpy as np
 
 from pbrdf.errors import PbrdfError
 from pbrdf.explorer.catalogue import catalogue
@@ -110,10 +113,14 @@ class Session:
             return
         try:
             self._send(content, buffers)
-        except Exception:
+        except Exception as error:
             # a page that goes while its picture is drawn takes what sends to it away
-            if not self._closed.is_set():
-                _log.exception("the explorer could not send %s", content.get("type"))
+            if self._closed.is_set():
+                return
+            _log.exception("the explorer could not send %s", content.get("type"))
+            if isinstance(error, ValueError):  # a number that JSON has not, and the page waits for an answer
+                with suppress(Exception):
+                    self._send(_unsent(content), [])
 
     def receive(self, content: dict[str, Any], buffers: Sequence[Any] = ()) -> None:
         """Take a request of the page; the answers come through ``emit``."""
@@ -194,9 +201,11 @@ class Session:
             if self._closed.is_set():
                 return
             try:
-                header, buffers = import_module(VIEWS[view]).draw(
-                    state, self.workspace, bool(content.get("dragging"))
-                )
+                # what comes of numbers beyond measure is no number, and is drawn as none
+                with np.errstate(all="ignore"):
+                    header, buffers = import_module(VIEWS[view]).draw(
+                        state, self.workspace, bool(content.get("dragging"))
+                    )
             except PbrdfError as error:
                 place = error.place if isinstance(error, StateError) else ""
                 header, buffers = {"error": str(error), "place": place}, []
@@ -205,3 +214,11 @@ class Session:
                 header, buffers = {"error": _FAULT, "place": ""}, []
             answer = {"type": "picture", "id": number, "view": view, "last": view == views[-1]}
             self.emit({**answer, **header}, buffers)
+
+
+def _unsent(content: Mapping[str, Any]) -> dict[str, Any]:
+    """What is said instead of an answer that cannot be sent."""
+    if content.get("type") == "picture":
+        known = {key: content[key] for key in ("type", "id", "view", "last")}
+        return {**known, "error": _FAULT, "place": ""}
+    return error_answer({**content, "type": None}, _FAULT)

@@ -135,6 +135,8 @@ def read_state(content: Any) -> State:
     for quantity in quantities:
         if quantity not in QUANTITIES:
             raise StateError("quantities", f"{quantity!r} is not one of {', '.join(QUANTITIES)}")
+    if not quantities:
+        raise StateError("quantities", "no quantity is drawn: choose one")
     if state.get("part", "total") not in PARTS:
         raise StateError("part", f"choose one of {', '.join(PARTS)}")
     settings = _mapping(state.get("settings", {}), "settings", "settings")
@@ -143,7 +145,7 @@ def read_state(content: Any) -> State:
         _index(state.get("active", 0), "active", len(layers)),
         None if compare is None else _index(compare, "compare", len(layers)),
         _light(state.get("light", {})),
-        tuple(quantities),
+        tuple(dict.fromkeys(quantities)),
         state.get("part", "total"),
         {name: _mapping(value, f"settings.{name}", "settings") for name, value in settings.items()},
     )
@@ -182,11 +184,13 @@ def _light(content: Any) -> Light:
     if not 0.0 <= theta_i <= 90.0:
         raise StateError("light.theta_i", "the angle of incidence is within 0 … 90 degrees")
     stokes = _sequence(light.get("stokes", [1.0, 0.0, 0.0, 0.0]), "light.stokes", 4)
-    numbers = [number(s, "light.stokes") for s in stokes]
     try:
-        S = check_incident(numbers)
-    except (ModelError, TypeError, ValueError) as error:
-        raise StateError("light.stokes", str(error)) from None
+        S = check_incident([number(s, "light.stokes") for s in stokes])
+    except (PbrdfError, TypeError, ValueError):
+        raise StateError(
+            "light.stokes",
+            "light has four numbers I, Q, U, V, with I > 0 and √(Q² + U² + V²) no larger than I",
+        ) from None
     return Light(theta_i, (S[0], S[1], S[2], S[3]))
 
 
@@ -212,6 +216,10 @@ def _index(value: Any, place: str, size: int) -> int:
 
 def number(value: Any, place: str) -> float:
     """A finite number, or StateError naming the place."""
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+    try:
+        found = float(value) if isinstance(value, int | float) and not isinstance(value, bool) else math.nan
+    except OverflowError:  # JSON's whole numbers have no end
+        found = math.inf
+    if not math.isfinite(found):
         raise StateError(place, f"{place} should be a number")
-    return float(value)
+    return found

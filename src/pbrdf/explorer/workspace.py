@@ -12,7 +12,7 @@ import numpy as np
 
 from pbrdf.errors import PbrdfError
 from pbrdf.explorer.catalogue import layer_of, state_of
-from pbrdf.explorer.state import MOST_LAYERS
+from pbrdf.explorer.state import MOST_LAYERS, QUANTITIES
 from pbrdf.models.base import Model
 from pbrdf.models.registry import find_model
 
@@ -26,6 +26,9 @@ __all__ = ["MOST_OPEN", "Workspace"]
 
 #: Data sets that are open at once, at most.
 MOST_OPEN = 64
+#: What the page calls single ratios, and how many quantities are drawn first of data that hold nothing else.
+_RATIOS = {"aolp": "aolp", "Q_over_I": "q", "U_over_I": "u", "V_over_I": "v"}
+_MOST_FIRST = 4
 #: Model that is shown with data alone, as it is what ``pbrdf.fit`` fits if it is not told another.
 _MODEL = "double-gauss"
 #: Views that stand on the page at first where a map is open.
@@ -151,6 +154,7 @@ class Workspace:
         if self.datasets:
             measured = np.rad2deg(self.datasets[0][1]["theta_i"].values)
             state["light"]["theta_i"] = round(float(np.median(measured)), 3)
+            state["quantities"] = _quantities(self.datasets[0][1]) or state["quantities"]
         return state
 
     def close(self) -> None:
@@ -182,3 +186,17 @@ def _free(name: str, taken: list[tuple[str, Any]]) -> str:
         number += 1
         free = f"{name} ({number})"
     return free
+
+
+def _quantities(dataset: xr.Dataset) -> list[str]:
+    """What is drawn first of data without intensity and degree of polarisation; empty for others."""
+    from pbrdf.data.select import measured_channels
+
+    channels = set(measured_channels(dataset))
+    if channels & {"I", "dolp", "mueller"} or channels >= {"Q_over_I", "U_over_I"}:
+        return []
+    known = {_RATIOS.get(name, "") for name in channels}
+    if "mueller_over_m00" in channels:
+        measured = np.isfinite(dataset["mueller_over_m00"].values).any(axis=0)
+        known |= {f"m{i}{j}" for i, j in np.argwhere(measured) if i or j}
+    return [quantity for quantity in QUANTITIES if quantity in known][:_MOST_FIRST]

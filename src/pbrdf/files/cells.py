@@ -181,11 +181,15 @@ class Slices:
 
 def _is_blank(characters: NDArray[np.uint8]) -> NDArray[np.bool_]:
     """Whether characters are a space, a tab, \\v or \\f."""
-    return (characters == 32) | (characters == 9) | (characters == 11) | (characters == 12)
+    values: NDArray[np.bool_] = (
+        (characters == 32) | (characters == 9) | (characters == 11) | (characters == 12)
+    )
+    return values
 
 
 def _is_gap(characters: NDArray[np.uint8]) -> NDArray[np.bool_]:
-    return _is_blank(characters) | (characters == 10)
+    values: NDArray[np.bool_] = _is_blank(characters) | (characters == 10)
+    return values
 
 
 @dataclass(frozen=True)

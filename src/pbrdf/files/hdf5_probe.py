@@ -135,7 +135,7 @@ def _check_array(array: Any, name: str, most: int) -> int:
         )
     shape = array.id.get_space().get_simple_extent_dims() or ()
     item = max(array.id.get_type().get_size(), 1)
-    declared = math.prod(shape) * item
+    declared: int = math.prod(shape) * item
     if declared > most:
         raise RefusedError(
             f"the variable {name!r} declares {' × '.join(map(str, shape))} values, {amount(declared)}, which a file "

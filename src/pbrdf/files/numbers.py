@@ -201,7 +201,8 @@ def _exponents(
 
 
 def _is_sign(character: NDArray[np.uint8]) -> NDArray[np.bool_]:
-    return (character == _MINUS) | (character == _PLUS)
+    values: NDArray[np.bool_] = (character == _MINUS) | (character == _PLUS)
+    return values
 
 
 def _integers(

@@ -40,7 +40,8 @@ def json_from_text(text: str | bytes) -> Any:
 
 def toml_from_text(text: str) -> dict[str, Any]:
     """What a TOML text stands for; raises ValueError as :func:`json_from_text` does."""
-    return _read(tomllib.loads, text)
+    found: dict[str, Any] = _read(tomllib.loads, text)
+    return found
 
 
 def _read(loads: Callable[[Any], Any], text: str | bytes) -> Any:

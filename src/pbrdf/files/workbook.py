@@ -68,7 +68,9 @@ def sheet_texts(path: Path, raw: bytes, sheet: str | None) -> dict[str, bytes]:
     names = list(workbook.sheet_names)
 
     def cells(name: str) -> list[list[Any]]:
-        found = _guarded(path, lambda: workbook.get_sheet_by_name(name).to_python(skip_empty_area=False))
+        found: list[list[Any]] = _guarded(
+            path, lambda: workbook.get_sheet_by_name(name).to_python(skip_empty_area=False)
+        )
         if archive is not None:
             _mark_errors(found, archive, name)
         return found

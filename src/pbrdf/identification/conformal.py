@@ -65,7 +65,8 @@ def told(probability: np.ndarray, inside: np.ndarray) -> np.ndarray:
         Of the materials, and whether they belong to the set; shape (B, C) each.
     """
     best = np.where(inside, probability, -1.0).argmax(axis=1)
-    return np.where(inside.any(axis=1), best, inside.shape[1])
+    values: np.ndarray = np.where(inside.any(axis=1), best, inside.shape[1])
+    return values
 
 
 @dataclass(frozen=True)

@@ -82,7 +82,8 @@ class Emulator:
 
     def nearest(self, unknowns: np.ndarray) -> np.ndarray:
         """Numbers of the nodes that specimens belong to, shapes (S, P) to (S,)."""
-        return np.clip(np.rint(self.position(unknowns)), 0, len(self.nodes) - 1).astype(int)
+        found: np.ndarray = np.clip(np.rint(self.position(unknowns)), 0, len(self.nodes) - 1).astype(int)
+        return found
 
     def values(self, unknowns: np.ndarray) -> np.ndarray:
         """Signals of specimens, shapes (S, P) to (S, D)."""
@@ -172,7 +173,8 @@ def _expanded(material: Material, data: Observations) -> Emulator:
     def around(centre: np.ndarray, steps: np.ndarray) -> np.ndarray:
         """(…, P) to (…, 1 + 2 P, P)."""
         offsets = np.concatenate([np.zeros((1, size)), np.diag(steps), -np.diag(steps)])
-        return np.clip(centre[..., None, :] + offsets, low, high)
+        values: np.ndarray = np.clip(centre[..., None, :] + offsets, low, high)
+        return values
 
     at = around(mean, spread)
     _, slopes = _signal(material, at, data)

@@ -348,6 +348,7 @@ def _from_nearby(
 
     def chosen(name: str) -> np.ndarray:
         old, new = getattr(found, name), getattr(again, name)
-        return np.where(better.reshape(-1, *[1] * (old.ndim - 1)), new, old)
+        values: np.ndarray = np.where(better.reshape(-1, *[1] * (old.ndim - 1)), new, old)
+        return values
 
     return Solution(*(chosen(f.name) for f in fields(Solution)))

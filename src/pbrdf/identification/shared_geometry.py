@@ -212,7 +212,8 @@ class SharedGeometry:
             modelled[scaled] *= np.exp(pixels.centre[pixel] + GAIN_SPREAD * z[tables.size])
         off = modelled - pixels.values.take(pixel, axis=1)
         result: np.ndarray = (pixels.weights.take(pixel, axis=1) * off**2).sum(axis=0)
-        return result + (z[: tables.size] ** 2).sum(axis=0)
+        result += (z[: tables.size] ** 2).sum(axis=0)
+        return result
 
     def _followed(
         self,

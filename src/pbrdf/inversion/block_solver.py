@@ -342,7 +342,7 @@ class _Evaluation:
     def by_block(self, u: np.ndarray, lanes: np.ndarray) -> np.ndarray:
         """Cost of each block, shape (n, G), with the penalties of its own unknowns, not of the shared ones."""
         blocks = self.problem.blocks
-        cost = self._sums(np.moveaxis(u[:, blocks.counting], 2, 0), lanes)[0]
+        cost: np.ndarray = self._sums(np.moveaxis(u[:, blocks.counting], 2, 0), lanes)[0]
         if self.problem.penalty is not None:
             cost = cost + 0.5 * (self.problem.penalty(u)[0][:, blocks.own] ** 2).sum(axis=2)
         return cost

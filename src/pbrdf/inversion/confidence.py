@@ -80,7 +80,8 @@ def check_points(points: int) -> None:
 
 def clipped(space: Space, unknowns: np.ndarray) -> np.ndarray:
     """Parameters (..., P), the rounding of the way through the unknowns not leading out of the bounds."""
-    return np.clip(space.to_parameters(unknowns), space.lower, space.upper)
+    values: np.ndarray = np.clip(space.to_parameters(unknowns), space.lower, space.upper)
+    return values
 
 
 def better_optimum(optima: Optima, lowest: Lowest, rise: float) -> tuple[dict[str, float] | None, float]:

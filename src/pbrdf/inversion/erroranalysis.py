@@ -424,7 +424,8 @@ def _run_probabilities(positive: int, negative: int) -> np.ndarray:
 
     def share(parts_above: np.ndarray, parts_below: np.ndarray) -> np.ndarray:
         ways = _log_choices(positive - 1, parts_above - 1) + _log_choices(negative - 1, parts_below - 1)
-        return np.exp(ways - orders)
+        values: np.ndarray = np.exp(ways - orders)
+        return values
 
     # the first run may be of either sign; an odd number of runs has one more of the first sign
     probability[2::2] = 2.0 * share(half, half)

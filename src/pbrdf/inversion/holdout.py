@@ -156,7 +156,8 @@ def prediction_errors(comparison: xr.Dataset, where: np.ndarray) -> Prediction:
         if relative:
             dark = DARK * typical(comparison[f"{channel}_measured"].values)
             error = error / np.maximum(measured, max(dark, np.finfo(float).tiny))
-        return error[np.isfinite(error)]
+        values: np.ndarray = error[np.isfinite(error)]
+        return values
 
     intensity, dolp = errors("I", relative=True), errors("dolp", relative=False)
     measured = [str(name).removesuffix("_measured") for name in comparison if "_over_" in str(name)]

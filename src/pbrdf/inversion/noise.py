@@ -111,7 +111,8 @@ class NoiseModel:
         if is_ratio(channel):
             size = np.where(np.isfinite(size), size, median)
             return np.hypot(self.relative, floor / np.maximum(size, np.finfo(float).tiny))
-        return np.hypot(self.relative * size, floor)
+        values: np.ndarray = np.hypot(self.relative * size, floor)
+        return values
 
     def __str__(self) -> str:
         return f"{self.relative:.3g} of the intensity plus {self.absolute:.3g} of its median"
@@ -168,7 +169,8 @@ class InstrumentNoise:
                 )
             known = np.where(np.isfinite(size), np.maximum(size, np.finfo(float).tiny), np.inf)
             return np.hypot(relative, floor / known)
-        return np.maximum(np.hypot(relative * size, floor), np.finfo(float).tiny)
+        values: np.ndarray = np.maximum(np.hypot(relative * size, floor), np.finfo(float).tiny)
+        return values
 
     def __str__(self) -> str:
         return (

@@ -330,7 +330,8 @@ def measurements(
     def on_scale(name: str, values: np.ndarray) -> np.ndarray:
         if divisor is None or is_ratio(name):
             return values
-        return values / (divisor[..., None, None] if name == "mueller" else divisor)
+        found: np.ndarray = values / (divisor[..., None, None] if name == "mueller" else divisor)
+        return found
 
     present = [n for n in VARIABLES if n in columns and not np.isnan(columns[n]).all()]
     if not present:

@@ -234,9 +234,11 @@ def _range(result: Optimum) -> list[Finding]:
 
 def _used(result: Optimum) -> np.ndarray:
     """Geometries of the fitted data with at least one measured value, shape (G,)."""
-    return np.isfinite(result.data.std).any(axis=0)
+    values: np.ndarray = np.isfinite(result.data.std).any(axis=0)
+    return values
 
 
 def _tilt(result: Optimum) -> np.ndarray:
     """Tilt of the mirror facet at the fitted geometries in radians, shape (G,)."""
-    return result.comparison["facet_tilt"].values[~result.comparison["held_out"].values]
+    values: np.ndarray = result.comparison["facet_tilt"].values[~result.comparison["held_out"].values]
+    return values

@@ -54,26 +54,33 @@ class Sides:
     @property
     def held(self) -> np.ndarray:
         """Which unknown each side holds, mask of shape (S, P)."""
-        return np.eye(len(self.optima.low), dtype=bool)[self.column]
+        values: np.ndarray = np.eye(len(self.optima.low), dtype=bool)[self.column]
+        return values
 
     @property
     def bound(self) -> np.ndarray:
         """The bound that each side faces, shape (S,)."""
-        return np.where(self.sign < 0.0, self.optima.low[self.column], self.optima.high[self.column])
+        values: np.ndarray = np.where(
+            self.sign < 0.0, self.optima.low[self.column], self.optima.high[self.column]
+        )
+        return values
 
     @property
     def room(self) -> np.ndarray:
         """Distance of the bound from the optimum, shape (D, S)."""
-        return np.abs(self.bound - self.optima.u[:, self.column])
+        values: np.ndarray = np.abs(self.bound - self.optima.u[:, self.column])
+        return values
 
     @property
     def margin(self) -> np.ndarray:
         """How close to a bound an unknown stands on it, shape (P,)."""
-        return 1e-9 * (self.optima.high - self.optima.low)
+        values: np.ndarray = 1e-9 * (self.optima.high - self.optima.low)
+        return values
 
     def unknown(self, distance: np.ndarray) -> np.ndarray:
         """The profiled unknowns at distances from the optimum, both of shape (D, S)."""
-        return self.optima.u[:, self.column] + self.sign * distance
+        values: np.ndarray = self.optima.u[:, self.column] + self.sign * distance
+        return values
 
 
 @dataclass(frozen=True)
@@ -175,12 +182,14 @@ class Brackets:
     @property
     def bracketed(self) -> np.ndarray:
         """Whether a distance outside is known, shape (D, S)."""
-        return np.isfinite(self.outer)
+        values: np.ndarray = np.isfinite(self.outer)
+        return values
 
     @property
     def sloped(self) -> np.ndarray:
         """Whether the rise is known at both ends, shape (D, S)."""
-        return np.isfinite(self.outer_root)
+        values: np.ndarray = np.isfinite(self.outer_root)
+        return values
 
     def refit(self) -> Outcome:
         """Refit the other unknowns at the trials, and at the inner ends of what is done."""
@@ -258,7 +267,8 @@ class Brackets:
         """Where a straight line between the roots at both ends of the bracket meets the threshold."""
         width, lacking = self.outer - self.inner, self.sides.target - self.inner_root
         with np.errstate(invalid="ignore", divide="ignore"):
-            return self.inner + width * lacking / (self.outer_root - self.inner_root)
+            values: np.ndarray = self.inner + width * lacking / (self.outer_root - self.inner_root)
+            return values
 
     def _extrapolated(self, stretch: float, least: float, most: float) -> np.ndarray:
         """Somewhat past where a straight line from the optimum through the inner end meets the threshold.

@@ -205,17 +205,20 @@ class Stack:
         return stack._whitened(correlation) if any(c.any() for c in correlation.values()) else stack
 
     def __len__(self) -> int:
-        return self.values.shape[-1]
+        found: int = self.values.shape[-1]
+        return found
 
     @property
     def points(self) -> int:
         """Number of geometries G."""
-        return self.values.shape[1]
+        found: int = self.values.shape[1]
+        return found
 
     @property
     def count(self) -> np.ndarray:
         """Number of measured values of each data set, shape (B,)."""
-        return np.isfinite(self.std).sum(axis=(0, 1))
+        values: np.ndarray = np.isfinite(self.std).sum(axis=(0, 1))
+        return values
 
     def take(self, chosen: np.ndarray) -> Stack:
         """Only some data sets; ``chosen`` is a mask of shape (B,) or an index array."""
@@ -261,7 +264,8 @@ class Stack:
                 place = place + np.sqrt(2.0) * np.unique(column, return_inverse=True)[1][:, None]
         measured = np.isfinite(self.std)
         if place.shape[1] == 1 and len(np.unique(place)) == len(place):
-            return measured.sum(axis=(0, 1))
+            values: np.ndarray = measured.sum(axis=(0, 1))
+            return values
         total = np.zeros(len(self), dtype=int)
         for channel in measured:
             ordered = np.sort(np.where(channel, place, np.inf), axis=0)
@@ -350,7 +354,8 @@ def _possible(angles: Mapping[str, np.ndarray]) -> np.ndarray:
     """Where source and viewer are above the horizon."""
     with np.errstate(invalid="ignore"):
         above = [(angles[name] >= 0.0) & (angles[name] < 0.5 * np.pi) for name in ("theta_i", "theta_r")]
-    return above[0] & above[1] & np.isfinite(angles["phi"])
+    values: np.ndarray = above[0] & above[1] & np.isfinite(angles["phi"])
+    return values
 
 
 def _usable(

@@ -98,7 +98,8 @@ def sobol_starts(lower: np.ndarray, upper: np.ndarray, count: int, seed: int = 0
         Shape (count, P). The points keep a distance of 5 % of the range from the bounds, where gradients of
         bounded parameters vanish.
     """
-    return lower + (0.05 + 0.9 * sobol_points(len(lower), count, seed)) * (upper - lower)
+    values: np.ndarray = lower + (0.05 + 0.9 * sobol_points(len(lower), count, seed)) * (upper - lower)
+    return values
 
 
 def sobol_points(size: int, count: int, seed: int = 0) -> np.ndarray:
@@ -108,7 +109,8 @@ def sobol_points(size: int, count: int, seed: int = 0) -> np.ndarray:
 
         sampler = qmc.Sobol(size, scramble=True, rng=np.random.default_rng(seed))
         points = sampler.random_base2(int(np.ceil(np.log2(max(count, 1)))))[:count]
-        return np.clip(points, 0.5 / (1 << _BITS), 1.0 - 0.5 / (1 << _BITS))
+        values: np.ndarray = np.clip(points, 0.5 / (1 << _BITS), 1.0 - 0.5 / (1 << _BITS))
+        return values
     shift = np.random.default_rng(seed).integers(0, 1 << _BITS, size)
     return np.asarray(((_sobol_integers(size, count) ^ shift) + 0.5) / (1 << _BITS))
 

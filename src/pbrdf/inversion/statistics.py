@@ -90,12 +90,14 @@ def covariance(information: np.ndarray, spread: np.ndarray) -> np.ndarray:
     eigenvalues, vectors = np.linalg.eigh(information * scale)
     floor = eigenvalues.max(axis=-1, keepdims=True, initial=0.0) * 1e-15 + 1e-200
     inverse = (vectors / np.maximum(eigenvalues, floor)[..., None, :]) @ vectors.swapaxes(-1, -2)
-    return inverse * scale
+    values: np.ndarray = inverse * scale
+    return values
 
 
 def prior_spread(lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
     """Standard deviation of a value of which only its bounds are known: range/√12."""
-    return (upper - lower) / math.sqrt(12.0)
+    values: np.ndarray = (upper - lower) / math.sqrt(12.0)
+    return values
 
 
 def typical(values: np.ndarray) -> float:

@@ -338,7 +338,8 @@ def _intensity_errors(result: Optimum) -> np.ndarray:
     if not np.isfinite(measured).any():
         return np.full(len(measured), np.nan)
     dark = max(DARK * typical(measured), np.finfo(float).tiny)
-    return (table["I_modelled"].values - measured) / np.maximum(measured, dark)
+    values: np.ndarray = (table["I_modelled"].values - measured) / np.maximum(measured, dark)
+    return values
 
 
 def _polarising(result: Optimum) -> list[str]:

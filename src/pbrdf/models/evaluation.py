@@ -125,7 +125,8 @@ def check_incident(incident: Any) -> list[float]:
             f"incident={incident!r} is not the Stokes vector of any light: it must be finite, I > 0 and "
             "√(Q² + U² + V²) ≤ I"
         )
-    return S.tolist()
+    found: list[float] = S.tolist()
+    return found
 
 
 def _depth(incident: Any) -> int:

@@ -56,7 +56,10 @@ def directional_hemispherical_reflectance(model: Model, theta_i: ArrayLike) -> n
             "the directional-hemispherical reflectance needs a model of single parameters, no maps"
         )
     flat = angles.ravel()
-    return (_specular_reflectance(model, flat) + _diffuse_reflectance(model, flat)).reshape(angles.shape)
+    values: np.ndarray = (_specular_reflectance(model, flat) + _diffuse_reflectance(model, flat)).reshape(
+        angles.shape
+    )
+    return values
 
 
 def albedo(model: Model) -> float:
@@ -125,7 +128,8 @@ def _specular_reflectance(model: Model, theta_i: np.ndarray) -> np.ndarray:
     theta_r = np.where(seen, np.arctan2(np.hypot(r[:, 0], r[:, 1]), r[:, 2]), 0.0)
     phi = np.where(seen, np.arctan2(r[:, 1], r[:, 0]), 0.0)
     f = brdf(model, theta_i[:, None, None], theta_r, phi, "specular")
-    return np.where(seen, f * r[:, 2] * 4.0 * cos_beta * cos_m**3 * area, 0.0).sum((1, 2))
+    values: np.ndarray = np.where(seen, f * r[:, 2] * 4.0 * cos_beta * cos_m**3 * area, 0.0).sum((1, 2))
+    return values
 
 
 def _diffuse_reflectance(model: Model, theta_i: np.ndarray) -> np.ndarray:
@@ -138,4 +142,5 @@ def _diffuse_reflectance(model: Model, theta_i: np.ndarray) -> np.ndarray:
     directions = theta_i[:, None, None], np.arccos(cos_r)[:, None], phi
     # kernels that stand already: that of the specular part, and that of whole matrices
     f = model.mueller(*directions)[..., 0, 0] - brdf(model, *directions, "specular")
-    return (f * cos_r[:, None] * solid_angle).sum((1, 2))
+    values: np.ndarray = (f * cos_r[:, None] * solid_angle).sum((1, 2))
+    return values

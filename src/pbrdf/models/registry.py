@@ -169,7 +169,8 @@ def model_from_file(path: Path, class_name: str) -> type[Model]:
     if class_name not in defined or model is None:
         listed = f"it defines {', '.join(defined)}" if defined else "it defines none"
         raise ModelError(f"{where}: {path} defines no model {class_name}: {listed}")
-    return register(model)
+    found: type[Model] = register(model)
+    return found
 
 
 def load_model(source: str | os.PathLike[str] | Mapping[str, Any]) -> Model:

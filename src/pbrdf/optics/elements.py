@@ -106,7 +106,8 @@ def retardance_rate(angle: ArrayLike, retardance: ArrayLike) -> np.ndarray:
     """
     delta = np.asarray(retardance, float)
     constant = 0.5 * (retarder(angle, delta) + retarder(angle, delta + np.pi))
-    return retarder(angle, delta + 0.5 * np.pi) - constant
+    values: np.ndarray = retarder(angle, delta + 0.5 * np.pi) - constant
+    return values
 
 
 def axis_rate(matrix: np.ndarray) -> np.ndarray:
@@ -116,7 +117,8 @@ def axis_rate(matrix: np.ndarray) -> np.ndarray:
     """
     turn = np.zeros((4, 4))
     turn[1, 2], turn[2, 1] = 2.0, -2.0
-    return matrix @ turn - turn @ matrix
+    values: np.ndarray = matrix @ turn - turn @ matrix
+    return values
 
 
 def _matrices(rows: list[list[np.ndarray]]) -> np.ndarray:

@@ -141,4 +141,5 @@ def facet_tilt(theta_i: Array, theta_r: Array, phi: Array) -> Array:
     """Tilt of the facet that mirrors source into viewer, θ_h of :func:`half_difference`, radians; same shape."""
     sin_i, sin_r = np.sin(theta_i), np.sin(theta_r)
     across = np.hypot(sin_r * np.cos(phi) - sin_i, sin_r * np.sin(phi))
-    return np.arctan2(across, np.cos(theta_i) + np.cos(theta_r))
+    found: Array = np.arctan2(across, np.cos(theta_i) + np.cos(theta_r))
+    return found

@@ -79,12 +79,12 @@ def _components(stokes: Any) -> tuple[Any, Any, Any, Any]:
         import drjit as dr
 
         if dr.is_tensor_v(stokes):
-            return tuple(stokes[..., i] for i in range(4))  # type: ignore[return-value]
-        return tuple(stokes[i] for i in range(4))  # type: ignore[return-value]
+            return tuple(stokes[..., i] for i in range(4))
+        return tuple(stokes[i] for i in range(4))
     dims = getattr(stokes, "dims", ())
     for name in ("stokes_out", "stokes"):
         if name in dims:
-            return tuple(stokes.isel({name: i}, drop=True) for i in range(4))  # type: ignore[return-value]
+            return tuple(stokes.isel({name: i}, drop=True) for i in range(4))
     import numpy as np
 
     array = np.asarray(stokes, dtype=float)
@@ -92,7 +92,7 @@ def _components(stokes: Any) -> tuple[Any, Any, Any, Any]:
         raise ValueError(
             f"a Stokes array has four numbers in its last dimension, got the shape {array.shape}"
         )
-    return tuple(array[..., i] for i in range(4))  # type: ignore[return-value]
+    return array[..., 0], array[..., 1], array[..., 2], array[..., 3]
 
 
 def _ratio(part: Any, intensity: Any) -> Any:

@@ -390,12 +390,14 @@ def _total(flat: np.ndarray, weights: np.ndarray) -> np.ndarray:
     """Σ weights M, shape (K, P, P)."""
     side = round(flat.shape[-1] ** 0.5)
     used = np.flatnonzero(weights)
-    return np.einsum("g,kgq->kq", weights[used], flat[:, used]).reshape(-1, side, side)
+    values: np.ndarray = np.einsum("g,kgq->kq", weights[used], flat[:, used]).reshape(-1, side, side)
+    return values
 
 
 def _sensitivity(flat: np.ndarray, gradient: np.ndarray) -> np.ndarray:
     """d(x) of every candidate, shape (G,)."""
-    return np.einsum("kgq,kq->g", flat, gradient.reshape(len(flat), -1), optimize=True)
+    values: np.ndarray = np.einsum("kgq,kq->g", flat, gradient.reshape(len(flat), -1), optimize=True)
+    return values
 
 
 def _unit_diagonal(matrices: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

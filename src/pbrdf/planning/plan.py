@@ -322,12 +322,13 @@ def information(
     spread = np.where(dark[..., None, None], np.eye(spread.shape[-1]), spread)
     weighted = np.linalg.solve(spread, jacobian)
     found = np.swapaxes(jacobian, -1, -2) @ weighted
-    return 0.5 * (found + np.swapaxes(found, -1, -2))
+    answer: np.ndarray = 0.5 * (found + np.swapaxes(found, -1, -2))
+    return answer
 
 
 def _slopes_of_ratios(values: np.ndarray) -> np.ndarray:
     """Derivatives of all components but the first over the first, by the components: (K, G, C) to (K, G, C − 1, C)."""
-    slopes = np.eye(values.shape[-1])[1:] / values[..., :1, None]
+    slopes: np.ndarray = np.eye(values.shape[-1])[1:] / values[..., :1, None]
     slopes[..., 0] = -values[..., 1:] / values[..., :1] ** 2
     return slopes
 
@@ -366,7 +367,8 @@ def _angle_covariance(
                 np.asarray(model.stokes(p.theta_i, p.theta_r, p.phi)) * np.cos(p.theta_i)[:, None] / cos_i
             )
             turn = rotate_frame(p.reference_angle - protocol.reference_angle)
-            return np.einsum("gij,gj->gi", turn, stokes)
+            values: np.ndarray = np.einsum("gij,gj->gi", turn, stokes)
+            return values
 
         here = seen(protocol)
         for before, after in places:
@@ -438,7 +440,8 @@ def _sizes(space: Space, values: np.ndarray) -> np.ndarray:
     """What errors of the parameters are relative to, shape of the values."""
     logarithmic = np.array([p.logarithmic for p in space.free])
     near_zero = np.where(logarithmic, 0.0, _NEAR_ZERO * prior_spread(space.lower, space.upper))
-    return np.maximum(np.abs(values), near_zero)
+    found: np.ndarray = np.maximum(np.abs(values), near_zero)
+    return found
 
 
 def _scale(
@@ -454,7 +457,8 @@ def _scale(
     values = space.to_parameters(guesses)
     logarithmic = np.array([p.logarithmic for p in space.free])
     unit = np.where(logarithmic, 1.0, _sizes(space, values))
-    return unit[:, interest] / np.array([weights.get(name, 1.0) for name in names])
+    found: np.ndarray = unit[:, interest] / np.array([weights.get(name, 1.0) for name in names])
+    return found
 
 
 def _require_determined(
@@ -475,7 +479,8 @@ def _errors(space: Space, unknowns: np.ndarray, matrix: np.ndarray) -> np.ndarra
     """Expected standard errors of the parameters, shape (P,)."""
     low, high = space.box
     spread = np.sqrt(np.diag(covariance(matrix, prior_spread(low, high))))
-    return spread * np.abs(space.derivative(space.to_parameters(unknowns)))
+    values: np.ndarray = spread * np.abs(space.derivative(space.to_parameters(unknowns)))
+    return values
 
 
 def _protocol(candidates: Protocol, counts: np.ndarray) -> Protocol:

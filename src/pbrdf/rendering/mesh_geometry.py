@@ -170,7 +170,10 @@ def _scene(path: str, smooth: bool, variant: str) -> Any:
 
 def _middle(scene: Any) -> np.ndarray:
     box = scene.bbox()
-    return 0.5 * (np.array(box.min, dtype=float).ravel() + np.array(box.max, dtype=float).ravel())
+    values: np.ndarray = 0.5 * (
+        np.array(box.min, dtype=float).ravel() + np.array(box.max, dtype=float).ravel()
+    )
+    return values
 
 
 def _extent(scene: Any) -> float:

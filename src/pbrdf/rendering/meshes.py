@@ -146,7 +146,8 @@ def _tangent_angle(x: np.ndarray, s: np.ndarray) -> np.ndarray:
 
 def _step(x: np.ndarray, centre: Any, width: float) -> np.ndarray:
     """From 0 to 1 about `centre`, over about `width`."""
-    return 0.5 + 0.5 * np.tanh((x - centre) * (2.0 / width))
+    values: np.ndarray = 0.5 + 0.5 * np.tanh((x - centre) * (2.0 / width))
+    return values
 
 
 def _refined(first: float, last: float, count: int, places: list[float]) -> np.ndarray:

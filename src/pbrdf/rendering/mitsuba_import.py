@@ -14,5 +14,5 @@ def import_mitsuba() -> Any:
     try:
         import mitsuba
     except ImportError as error:
-        raise BackendError(f"rendering needs Mitsuba: pip install 'mitsuba>=3.9' ({error})") from error
+        raise BackendError(f"rendering needs Mitsuba: pip install 'pbrdf[render]' ({error})") from error
     return mitsuba

@@ -61,7 +61,8 @@ class StokesPicture:
     @property
     def dolp(self) -> np.ndarray:
         """Degree of linear polarisation; NaN where there is no light."""
-        return dolp(np.moveaxis(self.stokes, 0, -1))
+        values: np.ndarray = dolp(np.moveaxis(self.stokes, 0, -1))
+        return values
 
     @property
     def aolp(self) -> np.ndarray:

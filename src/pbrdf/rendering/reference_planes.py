@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import drjit as dr
 
-from pbrdf.models.base import Matrix
+from pbrdf.models.arrays import Matrix
 from pbrdf.optics.geometry import Geometry, geometry_from_sines
 
 __all__ = ["LightPath", "light_path", "to_mitsuba"]

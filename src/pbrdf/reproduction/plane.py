@@ -32,7 +32,10 @@ def in_plane(model: Model, theta_i: ArrayLike, theta_r: ArrayLike, part: str = "
     phi = np.where(np.where(theta_i < 0.0, -theta_r, theta_r) < 0.0, np.pi, 0.0)
     # the total as the sum of its parts: the specular kernel then serves all interpretations
     parts = ("specular", "diffuse") if part == "total" else (part,)
-    return np.sum([model.stokes(np.abs(theta_i), np.abs(theta_r), phi, part=p) for p in parts], axis=0)
+    values: np.ndarray = np.sum(
+        [model.stokes(np.abs(theta_i), np.abs(theta_r), phi, part=p) for p in parts], axis=0
+    )
+    return values
 
 
 def turned(bistatic: ArrayLike, offset: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
@@ -48,10 +51,12 @@ def turned(bistatic: ArrayLike, offset: ArrayLike) -> tuple[np.ndarray, np.ndarr
 def offsets(reach: float, step: float = 0.02) -> np.ndarray:
     """Turns of the sample from −reach to +reach, all in degrees; returned in radians."""
     count = round(reach / step)
-    return np.deg2rad(np.arange(-count, count + 1) * step)
+    values: np.ndarray = np.deg2rad(np.arange(-count, count + 1) * step)
+    return values
 
 
 def zero_crossings(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """Where `y` changes sign along `x`, both of shape (N,), by linear interpolation."""
     left = np.flatnonzero(np.signbit(y[1:]) != np.signbit(y[:-1]))
-    return x[left] - y[left] * (x[left + 1] - x[left]) / (y[left + 1] - y[left])
+    values: np.ndarray = x[left] - y[left] * (x[left + 1] - x[left]) / (y[left + 1] - y[left])
+    return values

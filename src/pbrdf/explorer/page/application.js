@@ -21,8 +21,9 @@ class Application {
     this.ending = new AbortController();
     this.signal = this.ending.signal;
     this.hear = (content, buffers) => this.receive(content, buffers ?? []);
-    this.lose = () => { this.drawing = false; this.tell("disconnected"); };
-    this.find = () => this.tell("connected");
+    this.lose = why => { this.drawing = false; this.tell("disconnected", why); };
+    // what was asked for meanwhile went nowhere
+    this.find = () => { this.drawing = false; this.tell("connected"); };
     model.on("msg:custom", this.hear);
     model.on("disconnected", this.lose);
     model.on("connected", this.find);

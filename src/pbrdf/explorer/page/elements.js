@@ -25,9 +25,12 @@ let elementCount = 0;
 const freshId = name => `pbrdf-${name}-${++elementCount}`;
 
 // A number in few digits, with a true minus sign.
-const written = (value, digits = 3) => Number(value.toPrecision(digits)).toString().replace("-", "−");
+const written = (value, digits = 3) => Number(value.toPrecision(digits)).toString().replaceAll("-", "−");
 // The number that somebody wrote, NaN where it is none.
-const understood = text => text.trim() === "" ? NaN : Number(text.trim().replace("−", "-").replace(",", "."));
+const understood = text => text.trim() === "" ? NaN : Number(text.trim().replaceAll("−", "-").replace(",", "."));
+
+// A list of a state that came from elsewhere, none where it is something else.
+const listOf = value => Array.isArray(value) ? value : [];
 
 // Strokes of the icons on a field of 24 by 24.
 const ICONS = {

@@ -126,7 +126,11 @@ function workbenchOf(app, root) {
   function cardOf(name) {
     if (built.has(name)) return built.get(name);
     const view = known.get(name), place = element("div", { class: "view" });
-    const large = iconButton("enlarge", `Enlarge ${view.title}`, () => app.change(state => { page(state).large = state.settings.page.large === name ? null : name; }), { "aria-pressed": "false" });
+    const large = iconButton("enlarge", `Enlarge ${view.title}`, () => {
+      app.change(state => { page(state).large = state.settings.page.large === name ? null : name; });
+      // it may have moved below the others
+      node.scrollIntoView({ block: "nearest" });
+    }, { "aria-pressed": "false" });
     const fault = element("p", { class: "fault", role: "status" });
     const node = element("article", { class: view.wide ? "card wide" : "card", "data-view": name, "aria-label": view.title },
       element("header", {}, element("h2", {}, view.title), large, iconButton("remove", `Close ${view.title}`, () => { toggle(name); toggles.get(name).focus(); })), place, fault);
@@ -205,11 +209,11 @@ function noticesOf(app) {
     if (!stays) timer = setTimeout(() => { box.hidden = true; }, 12000);
   });
   const node = element("div", { class: "notices" }, gone, box);
-  node.lost = is => {
+  node.lost = (is, why) => {
     gone.hidden = lost.hidden = !is;
-    lost.textContent = is ? "The program behind this page does not answer; trying again. If it has ended, start pbrdf explore anew and open the address that it tells: the part of this page's address after # shows the same there." : "";
+    lost.textContent = !is ? "" : why ? `This page cannot be served: ${why}; trying again.` : "The program behind this page does not answer; trying again. If it has ended, start pbrdf explore anew and open the address that it tells: the part of this page's address after # shows the same there.";
   };
-  app.on("disconnected", () => node.lost(true));
+  app.on("disconnected", why => node.lost(true, why));
   return node;
 }
 

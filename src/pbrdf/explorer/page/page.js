@@ -31,6 +31,8 @@ function unpack(frame) {
 
 // Milliseconds before a lost connection is tried again, at first and in the end.
 const SOON = 500, LATE = 8000;
+// Code of a connection that is closed as there are too many.
+const FULL = 1013;
 
 // What AnyWidget gives a module: values by name and custom messages.
 class SocketModel {
@@ -54,8 +56,9 @@ class SocketModel {
       if (again) this.tell("connected"); else waiting.forEach(f => this.socket.send(f));
     };
     this.socket.onmessage = event => this.tell("msg:custom", ...unpack(event.data));
-    this.socket.onclose = () => {
-      this.tell("disconnected");
+    this.socket.onclose = event => {
+      // the server says why it takes no more pages
+      this.tell("disconnected", event.code === FULL ? event.reason : "");
       setTimeout(() => this.connect(), this.pause);
       this.pause = Math.min(2 * this.pause, LATE);
     };

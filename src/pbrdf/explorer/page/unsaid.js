@@ -48,6 +48,11 @@ function askerOf(app, root) {
   }
 
   app.on("answer:opened", ({ id }) => sent.delete(id));
+  for (const event of ["disconnected", "connected"]) app.on(event, () => {
+    if (!sent.size) return;
+    app.tell("note", `${[...sent.values()].map(file => file.name).join(", ")}: not opened, as the program did not answer; open again what is missing.`, true);
+    sent.clear();
+  });
   app.on("answer:error", content => {
     const file = sent.get(content.id);
     if (content.about !== "open" || !file) return;

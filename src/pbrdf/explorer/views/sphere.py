@@ -22,7 +22,7 @@ import numpy as np
 
 from pbrdf.backend import get_backend
 from pbrdf.errors import DataError
-from pbrdf.explorer.evaluation import mueller_matrix, prepare
+from pbrdf.explorer.evaluation import mueller_matrix, prepare, require_drawable
 from pbrdf.explorer.state import Light, State, StateError, number
 from pbrdf.explorer.workspace import Workspace
 from pbrdf.instruments.goniometer.rays import UPRIGHT, across, angles_of
@@ -211,8 +211,9 @@ def _ranges(fields: list[np.ndarray]) -> dict[str, float]:
         L, q, u, v = np.moveaxis(one, -1, 0)
         found.append([L, np.sqrt(q * q + u * u), v])
     values = found[0] if len(found) == 1 else [a - b for a, b in zip(*found, strict=True)]
-    names = ("radiance", "dolp", "circular")
-    return {name: _round_up(float((np.abs(v) * bright).max())) for name, v in zip(names, values, strict=True)}
+    most = [float((np.abs(v) * bright).max()) for v in values]
+    require_drawable(*most)
+    return dict(zip(("radiance", "dolp", "circular"), map(_round_up, most), strict=True))
 
 
 def _round_up(value: float) -> float:

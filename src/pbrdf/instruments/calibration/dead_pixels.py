@@ -116,4 +116,5 @@ def _outliers(image: np.ndarray, cell: tuple[int, int], threshold: float, floor:
     size = np.abs(difference)
     # at the border of a steep vignetting the median is not in the middle, for all pixels there: hence the local scale
     scale = np.maximum(_surroundings(size, cell), max(float(np.median(size)), floor * _MAD)) / _MAD
-    return np.sign(difference) * (size > threshold * scale)
+    values: np.ndarray = np.sign(difference) * (size > threshold * scale)
+    return values

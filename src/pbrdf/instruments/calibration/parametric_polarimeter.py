@@ -18,6 +18,8 @@ __all__ = ["ParametricPolarimeter"]
 class ParametricPolarimeter:
     """A polarimeter as a function of its settings: a vector of these, and its analyser vectors with derivatives."""
 
+    _describe: Callable[[np.ndarray], dict[str, Any]]
+
     def __init__(self, nominal: Polarimeter, gain: str, shared: bool, start_gain: float) -> None:
         self.nominal = nominal.details
         if "turned" in self.nominal or not nominal.is_described:

@@ -177,12 +177,16 @@ def calibrate_model(
 
     def residuals(x: np.ndarray) -> np.ndarray:
         W, b, _ = settings.evaluate(x)
-        return ((W @ train + b - read[:, kept]) / sigma).ravel()
+        values: np.ndarray = ((W @ train + b - read[:, kept]) / sigma).ravel()
+        return values
 
     def slopes(x: np.ndarray) -> np.ndarray:
         _, _, rates = settings.evaluate(x)
         by_offset = settings.by_offset[:, None, None]
-        return ((np.einsum("pna,ak->pnk", rates, train) + by_offset) / sigma).reshape(len(x), -1).T
+        values: np.ndarray = (
+            ((np.einsum("pna,ak->pnk", rates, train) + by_offset) / sigma).reshape(len(x), -1).T
+        )
+        return values
 
     movable = settings.angular & np.array([name not in reasons for name in settings.names])
     nudge = np.random.default_rng(0).standard_normal(len(movable)) * _NUDGE * movable

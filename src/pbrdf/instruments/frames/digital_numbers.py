@@ -227,7 +227,8 @@ def shifted(raw: np.ndarray, shift: int) -> np.ndarray:
             f"not all numbers are multiples of {2**shift}, as those of {_CONTAINER - shift} bits in the upper end of "
             '16 are: set alignment = "right" and the right bits in [detector]'
         )
-    return raw >> raw.dtype.type(shift)
+    values: np.ndarray = raw >> raw.dtype.type(shift)
+    return values
 
 
 def trailing_zeros(numbers: np.ndarray) -> int:

@@ -277,7 +277,8 @@ def _in_each(
             f"{first.path}: it holds {first.count} pictures, not {known}; if they are repeated exposures, set "
             'pages = "repeat" (with the states in the file "repeat, state" or "state, repeat") in [frames]'
         )
-    return _in_file(first, inside, usual, states)[1][0]
+    values: np.ndarray = _in_file(first, inside, usual, states)[1][0]
+    return values
 
 
 def _pictures_in(folder: Path, glob: str, suffixes: Sequence[str]) -> list[Path]:

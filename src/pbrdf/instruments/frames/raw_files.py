@@ -156,7 +156,8 @@ class RawFile:
 def _bytes(groups: np.ndarray, bits: int) -> np.ndarray:
     if bits == 8:
         return groups
-    return groups[:, 0] | groups[:, 1].astype(np.uint16) << 8
+    values: np.ndarray = groups[:, 0] | groups[:, 1].astype(np.uint16) << 8
+    return values
 
 
 def _stream(groups: np.ndarray, bits: int) -> np.ndarray:

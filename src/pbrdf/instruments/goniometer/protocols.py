@@ -305,7 +305,8 @@ class Protocol:
         angle = np.arctan2(*(np.einsum("gk,gk->g", x, rays[name]) for name in reversed(axes)))
         # rounding must not tell −90° from 90°, nor 180° from 0°
         angle = np.mod(angle, np.pi)
-        return np.where(angle > 0.5 * np.pi + 1e-12, angle - np.pi, angle)
+        values: np.ndarray = np.where(angle > 0.5 * np.pi + 1e-12, angle - np.pi, angle)
+        return values
 
     def displaced(self, turn: ArrayLike, camera: ArrayLike, tilt: ArrayLike = 0.0) -> Protocol:
         """The geometries that there really are if the goniometer is not where it says.
@@ -435,7 +436,8 @@ def crowded_sample_angles(
     j = np.arange(count) - (count - 1) / 2.0
     growth = np.sign(j) * (j / max((count - 1) / 2.0, 1.0)) ** 2
     reach = np.where(j < 0.0, zenith - half, min(zenith - half, half))
-    return np.deg2rad(90.0 - half + np.round(reach * growth, 2))
+    values: np.ndarray = np.deg2rad(90.0 - half + np.round(reach * growth, 2))
+    return values
 
 
 def _positions(bistatic: ArrayLike) -> np.ndarray:
@@ -448,7 +450,7 @@ def _positions(bistatic: ArrayLike) -> np.ndarray:
 
 def _of_position(sample_angles: ArrayLike | Sequence[ArrayLike], position: int) -> np.ndarray:
     """The sample angles of a camera position from one list for all or a list of lists."""
-    rows = list(sample_angles) if np.iterable(sample_angles) else [sample_angles]  # type: ignore[arg-type]
+    rows = list(sample_angles) if np.iterable(sample_angles) else [sample_angles]
     if all(np.ndim(row) == 0 for row in rows):
         return np.asarray(rows, dtype=float)
     if position >= len(rows):

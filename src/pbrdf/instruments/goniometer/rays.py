@@ -30,12 +30,14 @@ def ray_vectors(theta_i: np.ndarray, theta_r: np.ndarray, phi: np.ndarray) -> di
 
 def between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Angle between unit vectors, accurate when it is small; shape (...)."""
-    return 2.0 * np.arctan2(np.linalg.norm(a - b, axis=-1), np.linalg.norm(a + b, axis=-1))
+    values: np.ndarray = 2.0 * np.arctan2(np.linalg.norm(a - b, axis=-1), np.linalg.norm(a + b, axis=-1))
+    return values
 
 
 def across(ray: np.ndarray, normal: np.ndarray) -> np.ndarray:
     """The part of vectors at right angles to unit vectors, shape (..., 3)."""
-    return ray - (ray * normal).sum(-1, keepdims=True) * normal
+    values: np.ndarray = ray - (ray * normal).sum(-1, keepdims=True) * normal
+    return values
 
 
 def angles_of(

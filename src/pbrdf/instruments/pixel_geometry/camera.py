@@ -69,7 +69,8 @@ class PixelCamera:
             return np.array([0.0, 0.0, 1.0])
         across = -self.plane(x, y)
         vector = np.concatenate([across, np.full((*across.shape[:-1], 1), self.focal)], axis=-1)
-        return vector / np.linalg.norm(vector, axis=-1, keepdims=True)
+        values: np.ndarray = vector / np.linalg.norm(vector, axis=-1, keepdims=True)
+        return values
 
     def place(self, direction: np.ndarray) -> tuple[float, float]:
         """Where in the picture a ray towards the camera, from this direction (3,), is seen."""

@@ -168,7 +168,8 @@ class Panel(PixelGeometry):
             distance = self.pixel * camera.focal / float(middle[2])
         with np.errstate(divide="ignore", invalid="ignore"):
             along = (middle @ normal) / (view * normal).sum(-1, keepdims=True)
-        return distance * (middle - along * view)
+        values: np.ndarray = distance * (middle - along * view)
+        return values
 
 
 def _placed(

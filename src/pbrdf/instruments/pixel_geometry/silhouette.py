@@ -293,7 +293,8 @@ def _tolerance(radius: Any) -> Any:
 
 
 def _distance(circle: np.ndarray, points: np.ndarray) -> np.ndarray:
-    return np.hypot(points[:, 0] - circle[0], points[:, 1] - circle[1]) - circle[2]
+    values: np.ndarray = np.hypot(points[:, 0] - circle[0], points[:, 1] - circle[1]) - circle[2]
+    return values
 
 
 def _arc(circle: np.ndarray, points: np.ndarray) -> float:
@@ -326,7 +327,7 @@ def _sampled_circle(points: np.ndarray, part: np.ndarray) -> np.ndarray | None:
     off = np.hypot(thin[:, 0] - circles[:, :1], thin[:, 1] - circles[:, 1:2]) - circles[:, 2:]
     limit = _tolerance(circles[:, 2:])
     votes = (np.abs(off) < limit).sum(-1) - (off > limit).sum(-1)
-    circle = circles[np.argmax(votes)]
+    circle: np.ndarray = circles[np.argmax(votes)]
     for _ in range(5):
         close = np.abs(_distance(circle, points)) < _tolerance(circle[2])
         if close.sum() < 12:
@@ -390,7 +391,8 @@ def _left_over(profile: np.ndarray, off: np.ndarray) -> np.ndarray:
     for shape in (fine < 0.0, np.sqrt(np.maximum(-fine, 0.0))):
         shapes.append(np.interp(off, fine, np.convolve(shape, blur / blur.sum(), mode="same")))
     axes = np.linalg.qr(np.stack(shapes, axis=-1))[0]
-    return (profile**2).sum(axis=1) - ((profile @ axes) ** 2).sum(axis=1)
+    values: np.ndarray = (profile**2).sum(axis=1) - ((profile @ axes) ** 2).sum(axis=1)
+    return values
 
 
 def _outermost(profile: np.ndarray, level: np.ndarray, along: np.ndarray) -> np.ndarray:
@@ -445,7 +447,8 @@ def _precise_circle(
             axis = np.array([c[0], c[1], 1.0])
             axis /= np.linalg.norm(axis)
             angle = np.arctan2(np.linalg.norm(np.cross(rays, axis), axis=-1), rays @ axis)
-            return focal * (angle - c[2])
+            values: np.ndarray = focal * (angle - c[2])
+            return values
 
         first = [*(begin[:2] / begin[2]), math.atan(start[2] * scale / focal)]
         fit = least_squares(off_cone, first, loss="soft_l1", f_scale=0.2 * scale, x_scale=[1 / focal] * 3)
@@ -497,7 +500,8 @@ def _sampled_lines(points: np.ndarray) -> list[np.ndarray] | None:
 
 def _inside(line: np.ndarray, points: np.ndarray) -> np.ndarray:
     """How far points, shape (..., 2), lie on the side of a line that its normal points to."""
-    return points @ line[:2] - line[2]
+    values: np.ndarray = points @ line[:2] - line[2]
+    return values
 
 
 def _line(points: np.ndarray) -> np.ndarray:

@@ -88,7 +88,7 @@ class _Options:
         parts = tuple(self._number(key, part) for part in text.split("/"))
         if len(parts) != 3:
             raise DataError(f"{self._kind}: {key} is {text!r}: give X/Y/Z")
-        return parts  # type: ignore[return-value]
+        return parts
 
     def camera(self) -> PixelCamera:
         x, y = self.number("cx"), self.number("cy")
@@ -189,13 +189,14 @@ def _mesh(options: _Options, file: str | None) -> PixelGeometry:
     given = {_PLACES[key]: value for key, value in place.items() if value is not None}
     if "origin" not in given:
         raise DataError("mesh: name the camera's place, camera=X/Y/Z")
-    return home.MeshGeometry(
+    found: PixelGeometry = home.MeshGeometry(
         mesh=Path(_named("mesh", file)),
         smooth=smooth == "yes",
         pixel=options.number("pixel"),
         **given,
         **options.curved(),
     )
+    return found
 
 
 def _named(kind: str, file: str | None) -> str:

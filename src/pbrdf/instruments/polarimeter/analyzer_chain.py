@@ -45,4 +45,5 @@ class AnalyzerChain:
 
 
 def _row_times(row: np.ndarray, matrix: np.ndarray) -> np.ndarray:
-    return (row[..., None, :] @ matrix)[..., 0, :]
+    values: np.ndarray = (row[..., None, :] @ matrix)[..., 0, :]
+    return values

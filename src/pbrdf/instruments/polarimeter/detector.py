@@ -145,7 +145,8 @@ class Detector:
         numbers = np.rint(held / self.gain + self.offset)
         kind = np.uint8 if self.bits <= 8 else np.uint16
         top = 2.0**self.bits - 1.0 if self.full_scale is None else self.full_scale
-        return np.clip(numbers, 0.0, top).astype(kind)
+        values: np.ndarray = np.clip(numbers, 0.0, top).astype(kind)
+        return values
 
     def signal(self, frames: ArrayLike) -> np.ndarray:
         """Signal above black level, digital numbers."""

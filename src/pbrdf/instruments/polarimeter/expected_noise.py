@@ -53,7 +53,8 @@ def systematic_covariance(instrument: Instrument, stokes: np.ndarray) -> np.ndar
     linear, circular = instrument.polarimeter.accuracy
     size = 0.5 * np.nansum(np.square(stokes), axis=-1)
     calibration = np.diag([0.0, linear**2, linear**2, circular**2]) * size[..., None, None]
-    return calibration + instrument.stability**2 * stokes[..., :, None] * stokes[..., None, :]
+    values: np.ndarray = calibration + instrument.stability**2 * stokes[..., :, None] * stokes[..., None, :]
+    return values
 
 
 def rounding_covariance(instrument: Instrument, signal: np.ndarray, pixels: int) -> np.ndarray:
@@ -81,9 +82,10 @@ def rounding_covariance(instrument: Instrument, signal: np.ndarray, pixels: int)
     # propagated with the weights that the pixels have, those of their whole variance
     whole = np.moveaxis(np.nan_to_num(solve_stokes(signal, variance, W)[1]), (0, 1), (-2, -1))
     gain = whole @ (W.T / np.moveaxis(variance, 0, -1)[..., None, :])
-    return (
+    values: np.ndarray = (
         (1.0 - 1.0 / pixels) * (gain * np.moveaxis(common, 0, -1)[..., None, :]) @ np.swapaxes(gain, -1, -2)
     )
+    return values
 
 
 def automatic_exposure(instrument: Instrument, brightest: ArrayLike, fill: float = FILL) -> np.ndarray:

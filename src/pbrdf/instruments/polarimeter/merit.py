@@ -92,18 +92,23 @@ def condition_number(analyzer: ArrayLike, norm: Norm) -> np.ndarray:
         raise DataError(f"no norm is called {norm!r}; use one of {', '.join(_ORDERS)}")
     W = np.asarray(analyzer, dtype=float)
     order = _ORDERS[norm]
-    return np.linalg.norm(W, order, axis=(-2, -1)) * np.linalg.norm(_inverse(W), order, axis=(-2, -1))
+    values: np.ndarray = np.linalg.norm(W, order, axis=(-2, -1)) * np.linalg.norm(
+        _inverse(W), order, axis=(-2, -1)
+    )
+    return values
 
 
 def equally_weighted_variance(analyzer: ArrayLike) -> np.ndarray:
     """tr(WᵀW)⁻¹ of analyser vectors (..., N, 4), shape (...); 40/N at best."""
-    return (_inverse(np.asarray(analyzer, dtype=float)) ** 2).sum(axis=(-2, -1))
+    values: np.ndarray = (_inverse(np.asarray(analyzer, dtype=float)) ** 2).sum(axis=(-2, -1))
+    return values
 
 
 def gram_determinant(analyzer: ArrayLike) -> np.ndarray:
     """√det WᵀW of analyser vectors (..., N, 4), shape (...); for four perfect analysers 1/(3√3) at best."""
     singular = np.linalg.svd(np.asarray(analyzer, dtype=float), compute_uv=False)
-    return np.where(singular > RANK_TOLERANCE * singular[..., :1], singular, 1.0).prod(axis=-1)
+    values: np.ndarray = np.where(singular > RANK_TOLERANCE * singular[..., :1], singular, 1.0).prod(axis=-1)
+    return values
 
 
 def component_variance(analyzer: ArrayLike) -> np.ndarray:

@@ -209,7 +209,8 @@ class Polarimeter:
             raise DataError("this polarimeter has one set of analyser vectors: there is no map to spread")
         y = np.arange(first_row, rows if last_row is None else last_row) * self.analyzer.shape[0] // rows
         x = np.arange(columns) * self.analyzer.shape[1] // columns
-        return self.analyzer[y[:, None], x]
+        values: np.ndarray = self.analyzer[y[:, None], x]
+        return values
 
 
 def lcvr(

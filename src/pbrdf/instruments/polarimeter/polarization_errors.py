@@ -139,7 +139,8 @@ def unbiased_dolp_squared(stokes: ArrayLike, covariance: ArrayLike) -> np.ndarra
     S, C = _checked(stokes, covariance)
     normal = _normalized(S, C)
     with np.errstate(divide="ignore", invalid="ignore"):
-        return ((S[1:3] / S[0]) ** 2).sum(axis=0) - normal[0, 0] - normal[1, 1]
+        values: np.ndarray = ((S[1:3] / S[0]) ** 2).sum(axis=0) - normal[0, 0] - normal[1, 1]
+        return values
 
 
 def _checked(stokes: ArrayLike, covariance: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
@@ -154,7 +155,8 @@ def _normalized(S: np.ndarray, C: np.ndarray) -> np.ndarray:
         r = S[1:] / S[0]
         mixed = r[:, None] * C[0, 1:][None]
         moved = C[1:, 1:] - mixed - np.swapaxes(mixed, 0, 1) + r[:, None] * r[None] * C[0, 0]
-        return moved / S[0] ** 2
+        values: np.ndarray = moved / S[0] ** 2
+        return values
 
 
 def _along(r: np.ndarray, C: np.ndarray) -> np.ndarray:
@@ -162,7 +164,8 @@ def _along(r: np.ndarray, C: np.ndarray) -> np.ndarray:
     length2 = (r**2).sum(axis=0)
     with np.errstate(divide="ignore", invalid="ignore"):
         along = np.einsum("a...,ab...,b...->...", r, C, r) / length2
-    return np.where(length2 == 0.0, np.einsum("aa...->...", C) / len(r), along)
+    values: np.ndarray = np.where(length2 == 0.0, np.einsum("aa...->...", C) / len(r), along)
+    return values
 
 
 def _across(r: np.ndarray, C: np.ndarray) -> np.ndarray:

@@ -50,7 +50,8 @@ def row_space(analyzer: np.ndarray) -> np.ndarray:
 
 def determined_components(projector: np.ndarray) -> np.ndarray:
     """Which of I, Q, U, V are determined where :func:`row_space` is `projector`, shape (..., 4), bool."""
-    return np.einsum("...ii->...i", projector) > 1.0 - _SPANNED
+    values: np.ndarray = np.einsum("...ii->...i", projector) > 1.0 - _SPANNED
+    return values
 
 
 def solve_stokes(
@@ -187,7 +188,8 @@ def _graded_inverse(W: np.ndarray, root: np.ndarray, missing: np.ndarray) -> np.
     q, r, columns = qr(scaled[order], mode="economic", pivoting=True)
     inverse = np.empty((4, len(order)))
     inverse[np.ix_(columns, order)] = solve_triangular(r, q.T)
-    return inverse[:, : len(root)] * root
+    values: np.ndarray = inverse[:, : len(root)] * root
+    return values
 
 
 def _invert(matrices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -87,7 +87,8 @@ class MuellerMeans:
     @property
     def std(self) -> np.ndarray:
         """Standard uncertainties of the elements, shape (M, 4, 4)."""
-        return np.sqrt(np.einsum("mii->mi", self.covariance)).reshape(-1, 4, 4)
+        values: np.ndarray = np.sqrt(np.einsum("mii->mi", self.covariance)).reshape(-1, 4, 4)
+        return values
 
 
 def mueller_of_frames(
@@ -191,7 +192,10 @@ def _noise(readings: np.ndarray, variance: np.ndarray) -> np.ndarray:
     """Expected rms residual of 16 elements fitted to the readings (..., N), over their mean."""
     count = readings.shape[-1]
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.sqrt(variance.mean(axis=-1) * (count - 16) / count) / np.abs(readings.mean(axis=-1))
+        values: np.ndarray = np.sqrt(variance.mean(axis=-1) * (count - 16) / count) / np.abs(
+            readings.mean(axis=-1)
+        )
+        return values
 
 
 def mueller_of_table(path: str | Path, instrument: Instrument) -> MuellerMeans:

@@ -112,7 +112,8 @@ class Settings:
             return self.transmission * np.array([1.0, 0.0, 0.0, 1.0 if left else -1.0])
         turn = rotate_frame(math.radians(self.zero))
         if state.vector is not None:
-            return np.asarray(state.vector) @ turn
+            turned: np.ndarray = np.asarray(state.vector) @ turn
+            return turned
         sign = -1.0 if self.clockwise else 1.0
         axis = self.polarizer if state.polarizer is None else state.polarizer
         row = 2.0 * self.transmission * diattenuator(sign * math.radians(axis))[0]
@@ -124,7 +125,8 @@ class Settings:
                     "option analyzer retardance"
                 )
             row = row @ retarder(sign * math.radians(state.retarder), math.radians(retardance))
-        return row @ turn
+        analyzer: np.ndarray = row @ turn
+        return analyzer
 
     def assumptions(self, states: list[State], stokes_stated: bool) -> list[str]:
         """Sentences on what these states need that nobody stated."""

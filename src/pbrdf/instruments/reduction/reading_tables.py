@@ -526,7 +526,8 @@ def _exposures(table: Table) -> NDArray[np.float64]:
     bad = np.flatnonzero(~(np.isfinite(found) & (found > 0.0)))
     if bad.size:
         raise DataError(f"{table.place(int(bad[0]), index)}: an exposure is a number above 0")
-    return found / found[0]
+    values: NDArray[np.float64] = found / found[0]
+    return values
 
 
 def _light(table: Table) -> list[float] | str | None:

@@ -138,7 +138,8 @@ class LabelRegion:
         return float(columns.min()), float(columns.max() + 1), float(rows.min()), float(rows.max() + 1)
 
     def mask(self, first_row: int, last_row: int, columns: int) -> np.ndarray:
-        return self.labels[first_row:last_row, :columns] == self.value
+        values: np.ndarray = self.labels[first_row:last_row, :columns] == self.value
+        return values
 
     def outline(self) -> np.ndarray:
         return Rectangle(*self.box).outline()

@@ -178,7 +178,8 @@ class VirtualExperiment:
         stokes = stokes_under_disc(
             model, true.theta_i, true.theta_r, true.phi, source.angular_radius, incident
         )
-        return stokes * np.cos(true.theta_i)[:, None]
+        values: np.ndarray = stokes * np.cos(true.theta_i)[:, None]
+        return values
 
     def _polarimeters(self, count: int, rng: np.random.Generator) -> list[Polarimeter]:
         """What the polarimeter really is at each geometry."""

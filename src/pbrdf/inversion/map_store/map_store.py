@@ -300,7 +300,7 @@ def stored_attributes(path: Path) -> dict[str, Any]:
         raise DataError(f"{path}: there is something else of that name, which is left alone; choose another")
     try:
         content = json_from_text((path / "zarr.json").read_bytes())
-        attributes = content["attributes"]
+        attributes: dict[str, Any] = content["attributes"]
         version = attributes[_VERSION]
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise DataError(f"{path}: this Zarr folder is no map of pbrdf, or it is damaged") from error

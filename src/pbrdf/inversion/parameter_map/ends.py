@@ -71,7 +71,8 @@ class Ends:
     @property
     def reached(self) -> np.ndarray:
         """Which pixels have an end at all, shape (B,)."""
-        return np.isfinite(self.cost)
+        values: np.ndarray = np.isfinite(self.cost)
+        return values
 
     def put(self, pixels: np.ndarray, found: Ends) -> None:
         """Take the ends of some pixels."""
@@ -174,7 +175,8 @@ class Pixels:
         first = low[:, None] + part * (high - low)[:, None]
         bounds = self.space.to_parameters(low), self.space.to_parameters(high)
         apply_starts(first, self.space, self.begin, self.start, bounds)
-        return np.clip(first, low[:, None], high[:, None])
+        values: np.ndarray = np.clip(first, low[:, None], high[:, None])
+        return values
 
     def search(self, owner: np.ndarray, start: np.ndarray) -> Solution:
         """Rough ends of lanes, in draft accuracy and single precision; ``owner`` is the pixel of each."""

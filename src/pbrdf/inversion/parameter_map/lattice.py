@@ -70,7 +70,8 @@ def levels(shape: Sequence[int], places: np.ndarray) -> list[Level]:
 
 def cells(shape: Sequence[int], places: np.ndarray, step: int) -> np.ndarray:
     """Number of the cell of each place, cells being ``step`` pixels wide."""
-    return np.ravel_multi_index(tuple((places // step).T), [-(-n // step) for n in shape])
+    values: np.ndarray = np.ravel_multi_index(tuple((places // step).T), [-(-n // step) for n in shape])
+    return values
 
 
 def neighbours(shape: Sequence[int], places: np.ndarray) -> np.ndarray:

@@ -98,7 +98,10 @@ def _from_parents(pixels: Pixels, level: Level, ends: Ends, freedom: np.ndarray)
 
     def bad(cost: np.ndarray, of: np.ndarray) -> np.ndarray:
         scale = np.maximum(expected[of], 1e-12)
-        return 2.0 * cost > SUITS * scale * (freedom[number[of]] + FOR_EACH_UNKNOWN * start.shape[1])
+        values: np.ndarray = 2.0 * cost > SUITS * scale * (
+            freedom[number[of]] + FOR_EACH_UNKNOWN * start.shape[1]
+        )
+        return values
 
     kept = np.flatnonzero(~lost)
     cost = pixels.costs(number[kept], start[kept])
@@ -223,7 +226,8 @@ def standing_out(
 
 
 def _reduced(cost: np.ndarray, freedom: np.ndarray) -> np.ndarray:
-    return 2.0 * cost / freedom
+    values: np.ndarray = 2.0 * cost / freedom
+    return values
 
 
 def _medians(values: np.ndarray, group: np.ndarray) -> np.ndarray:

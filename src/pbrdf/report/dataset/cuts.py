@@ -82,7 +82,8 @@ def in_plane(points: Points) -> np.ndarray:
     along_normal = np.minimum(points.theta_r, points.theta_i) < _ANGLE_GAP
     # With the source at the normal every azimuth is in a plane of incidence, but one cut is drawn, not all.
     along_normal &= points.theta_r < _ANGLE_GAP
-    return (phi <= _AZIMUTH_TOLERANCE) | (phi >= 180.0 - _AZIMUTH_TOLERANCE) | along_normal
+    values: np.ndarray = (phi <= _AZIMUTH_TOLERANCE) | (phi >= 180.0 - _AZIMUTH_TOLERANCE) | along_normal
+    return values
 
 
 def in_plane_cuts(points: Points) -> list[Cut]:

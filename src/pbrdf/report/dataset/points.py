@@ -171,4 +171,5 @@ def dolp_uncertainty(
             variance = np.maximum(
                 np.einsum("...i,...ij,...j->...", parts, correlation[..., :3, :3], parts), 0.0
             )
-        return np.sqrt(variance) / np.abs(I)
+        values: np.ndarray = np.sqrt(variance) / np.abs(I)
+        return values

@@ -7,7 +7,8 @@ from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from pbrdf.inversion.conventions_check import contradicted_conventions, misfit
-from pbrdf.inversion.suggestions import Suggestion, suggestions
+from pbrdf.inversion.suggestions import suggestions
+from pbrdf.inversion.trials import Suggestion
 from pbrdf.inversion.verdict import Level
 from pbrdf.models.parameters import shown_unit
 

@@ -83,9 +83,10 @@ def calibration_figure(made: InstrumentCalibration, name: str) -> Figure:
 def _mean_ratios(found: np.ndarray) -> np.ndarray:
     """Q/I, U/I, V/I, shape (3, K); over a map the mean of its cells."""
     ratios = found[1:] / found[0]
-    return (
+    values: np.ndarray = (
         ratios if ratios.ndim == 2 else np.nanmean(np.where(np.isfinite(ratios), ratios, np.nan), axis=(2, 3))
     )
+    return values
 
 
 def _magnification(both: dict[str, np.ndarray], S: np.ndarray) -> int:
@@ -96,7 +97,8 @@ def _magnification(both: dict[str, np.ndarray], S: np.ndarray) -> int:
 
 def _known_parts(errors: np.ndarray) -> np.ndarray:
     """Without a component that is not measured."""
-    return errors[np.isfinite(errors).any(axis=1)]
+    values: np.ndarray = errors[np.isfinite(errors).any(axis=1)]
+    return values
 
 
 def _draw_states(
@@ -176,19 +178,25 @@ def _draw_errors(
 
 
 def _error(kind: str, found: np.ndarray, S: np.ndarray) -> np.ndarray:
-    if kind.startswith("AoLP"):
-        return np.rad2deg(angle_errors(found, S))
-    return input_errors(found, S)[3 if kind == "DoLP" else 4]
+    errors: np.ndarray = (
+        np.rad2deg(angle_errors(found, S))
+        if kind.startswith("AoLP")
+        else input_errors(found, S)[3 if kind == "DoLP" else 4]
+    )
+    return errors
 
 
 def _rms_over_cells(errors: np.ndarray) -> np.ndarray:
     """Absolute values (K,), or rms over the cells of (K, rows, columns)."""
+    sizes: np.ndarray
     if errors.ndim == 1:
-        return np.abs(errors)
+        sizes = np.abs(errors)
+        return sizes
     known = np.isfinite(errors)
     total = np.where(known, errors, 0.0) ** 2
     with np.errstate(invalid="ignore"):
-        return np.sqrt(total.sum(axis=(1, 2)) / known.sum(axis=(1, 2)))
+        sizes = np.sqrt(total.sum(axis=(1, 2)) / known.sum(axis=(1, 2)))
+    return sizes
 
 
 def _draw_maps(figure: Any, made: InstrumentCalibration, circular: bool) -> None:

@@ -170,4 +170,5 @@ def _over_cells(vectors: np.ndarray) -> np.ndarray:
         return vectors
     known = np.isfinite(vectors[0])
     total = np.where(known, vectors, 0.0).sum(axis=(2, 3))
-    return total / known.sum(axis=(1, 2))
+    values: np.ndarray = total / known.sum(axis=(1, 2))
+    return values

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pbrdf.instruments.polarimeter.merit import merit
+from pbrdf.instruments.polarimeter.merit import Merit, merit
 from pbrdf.optics.stokes import STOKES
 from pbrdf.report.numbers import brief, per_cent, with_error
 from pbrdf.report.printing import plain_table
@@ -81,7 +82,7 @@ def merit_table(instruments: dict[str, Polarimeter]) -> Table:
     table = plain_table("figures of merit", "of", *found, "best possible")
     others = first.rank - 1
     variance = 4.0 * (1.0 + others**2) / size
-    rows = (
+    rows: tuple[tuple[str, Callable[[Merit], np.ndarray], float], ...] = (
         ("condition number, 2-norm", lambda m: m.condition["2"], np.sqrt(others)),
         (
             "condition number, Frobenius norm",

@@ -227,7 +227,8 @@ def _plain(ax: Axes, shown: ShownMap, where: np.ndarray, colour: str) -> None:
 
 
 def _without_result(shown: ShownMap) -> np.ndarray:
-    return ~(shown.good | shown.masked | shown.pending)
+    values: np.ndarray = ~(shown.good | shown.masked | shown.pending)
+    return values
 
 
 def _others(ax: Axes, shown: ShownMap) -> None:

@@ -297,7 +297,8 @@ class ShownMap:
     @property
     def masked(self) -> np.ndarray:
         """Pixels that were not measured, or left out."""
-        return np.logical_or.reduce([self.state(name) for name in WITHOUT])
+        values: np.ndarray = np.logical_or.reduce([self.state(name) for name in WITHOUT])
+        return values
 
     @property
     def searched(self) -> np.ndarray:
@@ -307,7 +308,8 @@ class ShownMap:
     def flagged(self, *names: str) -> np.ndarray:
         """Which parameters of which pixels with a result have one of these flags."""
         bits = sum(self.masks.get(name, 0) for name in names)
-        return (self.flags & np.uint8(bits) != 0) & self.good
+        values: np.ndarray = (self.flags & np.uint8(bits) != 0) & self.good
+        return values
 
     @property
     def at_bounds(self) -> np.ndarray:
@@ -316,7 +318,8 @@ class ShownMap:
 
     def determined(self, parameter: int) -> np.ndarray:
         """Pixels with a result whose data determine a parameter: elsewhere its value means nothing."""
-        return self.good & ~self.flagged("undetermined")[parameter]
+        values: np.ndarray = self.good & ~self.flagged("undetermined")[parameter]
+        return values
 
     def varies(self, parameter: int) -> bool:
         """Whether a parameter differs from pixel to pixel; those that are shared do not."""

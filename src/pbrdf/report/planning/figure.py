@@ -53,7 +53,8 @@ def plan_figure(plan: Plan, name: str, *, reference: str = "3 × 21") -> Figure:
 
 def _signed(protocol: Protocol) -> np.ndarray:
     """Viewing angle, negative on the source's side, degrees."""
-    return np.rad2deg(protocol.theta_r) * np.where(np.cos(protocol.phi) < 0.0, -1.0, 1.0)
+    values: np.ndarray = np.rad2deg(protocol.theta_r) * np.where(np.cos(protocol.phi) < 0.0, -1.0, 1.0)
+    return values
 
 
 def _draw_plane(

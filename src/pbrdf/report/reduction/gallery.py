@@ -114,4 +114,5 @@ def safe_name(name: str) -> str:
 
 def _spread(count: int, most: int) -> list[int]:
     """Numbers of all series, or of so many evenly spread ones."""
-    return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(int)).tolist()
+    found: list[int] = np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(int)).tolist()
+    return found

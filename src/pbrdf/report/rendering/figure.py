@@ -177,7 +177,7 @@ def _image(
     _bare(ax)
     bar = figure.colorbar(shown, ax=ax, shrink=0.9, extend=extend, pad=0.02)
     bar.set_label(label)
-    bar.outline.set_visible(False)  # type: ignore[operator]
+    bar.outline.set_visible(False)
     return bar
 
 

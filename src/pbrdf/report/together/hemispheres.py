@@ -170,7 +170,7 @@ def _views(sources: Sequence[Source], angle: float, light: Sequence[float], *, f
             )
         if source.model is not None:
             theta_r, phi = _grid(angle, fine)
-            values = source.modelled(("intensity", "dolp"), light, np.deg2rad(angle), theta_r, phi)  # type: ignore[arg-type]
+            values = source.modelled(("intensity", "dolp"), light, np.deg2rad(angle), theta_r, phi)
             views.append(_View(source.name + (": model" if both else ""), False, theta_r, phi, values))
     return views
 
@@ -206,7 +206,8 @@ def _radius(name: str, values: Sequence[np.ndarray]) -> tuple[Callable[[np.ndarr
         with np.errstate(divide="ignore", invalid="ignore"):
             share = ((np.log10(value) if logarithmic else value) - low) / (high - low)
         # facets without extent have no normal to be shaded by
-        return np.clip(np.nan_to_num(share), 1e-4, 1.0)
+        values: np.ndarray = np.clip(np.nan_to_num(share), 1e-4, 1.0)
+        return values
 
     return radius, f"\n(logarithmic, from {norm.vmin:.2g})" if logarithmic else ""
 

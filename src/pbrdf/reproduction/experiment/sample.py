@@ -88,7 +88,8 @@ class Sample:
     def modelled_intensity(self) -> np.ndarray:
         """The fitted model's intensity, digital numbers, shape (G,)."""
         cosine = np.cos(self.dataset["theta_i"].values)
-        return np.asarray(self.result.comparison["I_modelled"].values) * cosine * self.scale
+        values: np.ndarray = np.asarray(self.result.comparison["I_modelled"].values) * cosine * self.scale
+        return values
 
     @property
     def dolp(self) -> np.ndarray:

@@ -14,6 +14,7 @@ from pbrdf.reproduction.paper import SIMULATED
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
 
 __all__ = ["ANGLE", "dop_figure", "intensity_figure", "position_handles"]
 
@@ -43,7 +44,7 @@ def dop_figure(samples: Sequence[Sample], positions: Sequence[float]) -> Figure:
     return _figure(samples, positions, "Figure 7: degree of polarisation", intensity=False)
 
 
-def position_handles(positions: Sequence[float], *, lines: bool) -> list:
+def position_handles(positions: Sequence[float], *, lines: bool) -> list[Line2D]:
     """Entries of a legend: the camera positions, the last one predicted, and what points and lines are."""
     from matplotlib.lines import Line2D
 

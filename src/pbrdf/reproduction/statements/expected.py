@@ -118,7 +118,8 @@ def _figure_3() -> Iterator[Number]:
         incidence = np.deg2rad(FIGURE_3_INCIDENCE)
         stokes = in_plane(model, incidence, theta_r, "specular")
         stokes = stokes + in_plane(model.replace(sigma=_FLAT), incidence, theta_r, "diffuse")
-        return stokes[:, 1] / stokes[:, 0]
+        values: np.ndarray = stokes[:, 1] / stokes[:, 0]
+        return values
 
     def outer_zeros(q: np.ndarray) -> np.ndarray:
         zeros = np.rad2deg(zero_crossings(theta_r, q))

@@ -30,7 +30,8 @@ DIFFUSE_AT = (10.0, 20.0, 60.0)
 def radiance(model: Model, positions: Sequence[float], offset: np.ndarray) -> np.ndarray:
     """f cosθ_i of the turning sample, which a camera sees; angles in radians, shape (positions, offsets)."""
     theta_i, theta_r = turned(positions, offset)
-    return in_plane(model, theta_i, theta_r)[..., 0] * np.cos(theta_i)
+    values: np.ndarray = in_plane(model, theta_i, theta_r)[..., 0] * np.cos(theta_i)
+    return values
 
 
 def narrow_peaks(interpretation: Interpretation, positions: Sequence[float]) -> Outcome:

@@ -64,7 +64,7 @@ PANELS.push({
         if (values.length < 2) continue;
         const boxes = values.map(value => {
           const box = element("input", { type: "checkbox", onchange: () => set(settings => {
-            const before = settings.held_out?.kind === kind ? settings.held_out.values : [];
+            const before = settings.held_out?.kind === kind ? listOf(settings.held_out.values) : [];
             const after = box.checked ? [...before, String(value)] : before.filter(v => v !== String(value));
             settings.held_out = after.length ? { kind, values: after } : null;
           }) });
@@ -78,13 +78,14 @@ PANELS.push({
       mark(app.state);
     };
     const mark = state => {
-      const { off = [], held_out: out } = state.settings.data ?? {};
-      for (const [key, box] of held) box.checked = Boolean(out) && out.values.some(value => key === `${out.kind}=${value}`);
+      const { off: given, held_out: out } = state.settings.data ?? {}, off = listOf(given);
+      for (const [key, box] of held) box.checked = listOf(out?.values).some(value => key === `${out.kind}=${value}`);
       if (!offButton) return;
       offButton.disabled = off.length === 0;
       offButton.textContent = off.length ? `Switch ${off.length} ${off.length === 1 ? "point" : "points"} on again` : "All points are switched on";
     };
     app.on("answer:data", content => { fault.textContent = ""; build(content); });
+    app.on("connected", () => { if (app.state) ask(); });
     // what has just been opened is shown
     app.on("answer:opened", ({ datasets }) => {
       if (!app.state || !datasets?.length) return;

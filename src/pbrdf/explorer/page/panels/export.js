@@ -41,7 +41,7 @@ PANELS.push({
       line.hidden = !content.command;
     });
     app.on("answer:error", content => { if (content.about === "export") save.disabled = false; });
-    app.on("disconnected", () => { save.disabled = false; });
+    for (const event of ["disconnected", "connected"]) app.on(event, () => { save.disabled = false; });
     return { update() {} };
   },
 });

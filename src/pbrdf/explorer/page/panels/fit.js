@@ -29,7 +29,7 @@ PANELS.push({
       list.replaceChildren(...app.catalogue.models[model].parameters.map(p => {
         const box = element("input", { type: "checkbox", onchange: () => set(settings => {
           // those that a fit holds by default are freed by name, the others held by name
-          const key = p.fitted ? "held" : "free", names = new Set(settings[key] ?? []);
+          const key = p.fitted ? "held" : "free", names = new Set(listOf(settings[key]));
           if (box.checked === p.fitted) names.delete(p.name); else names.add(p.name);
           settings[key] = [...names];
         }) });
@@ -42,14 +42,15 @@ PANELS.push({
       cancel.disabled = !on;
       if (!on) bar.value = 0;
     };
-    // The values go to the sliders, one step of undo.
+    // The values go to the sliders, one step of undo; models may have come and gone meanwhile.
     const takeOver = fit => {
-      const layer = app.state.layers[fit.layer];
-      if (!layer || layer.model !== fit.model) {
+      const { layers } = app.state, is = layer => layer?.model === fit.model && layer.name === fit.name;
+      const index = is(layers[fit.layer]) ? fit.layer : layers.findIndex(is);
+      if (index < 0) {
         status.textContent = "The model that was fitted is not shown any more: its values were not taken over.";
         return;
       }
-      app.change(state => { Object.assign(state.layers[fit.layer].parameters, fit.values); });
+      app.change(state => { Object.assign(state.layers[index].parameters, fit.values); });
     };
     app.on("answer:fit_started", () => { run(true); fault.textContent = ""; wanted = 1; status.textContent = "Fitting …"; bar.removeAttribute("value"); });
     app.on("answer:fit_progress", ({ done, of, chi2 }) => {
@@ -77,7 +78,8 @@ PANELS.push({
     });
     return {
       update(state) {
-        const { model } = state.layers[state.active], { held = [], free = [], starts: count = 16 } = state.settings.fit ?? {};
+        const { model } = state.layers[state.active], { starts: count = 16, ...settings } = state.settings.fit ?? {};
+        const held = listOf(settings.held), free = listOf(settings.free);
         if (shown !== model) { rebuild(model); shown = model; }
         for (const { box, p } of boxes.values()) box.checked = p.fitted ? !held.includes(p.name) : free.includes(p.name);
         if (starts.getRootNode().activeElement !== starts) starts.value = count;

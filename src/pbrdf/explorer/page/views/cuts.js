@@ -10,6 +10,8 @@ const CUT_DECADES = 5;
 // How near the pointer has to be to a point, in units of the drawing.
 const CUT_NEAR = 14;
 const CUT_MANY_TICKS = 5;
+// Polarisation that is none.
+const CUT_NOTHING = 1e-6;
 
 const doubles = view => new Float64Array(view.buffer.slice(view.byteOffset, view.byteOffset + view.byteLength));
 const singles = view => new Float32Array(view.buffer.slice(view.byteOffset, view.byteOffset + view.byteLength));
@@ -244,7 +246,7 @@ const ONLY_CUTS = { views: ["cuts"] };
 function switchPoints(app, rows, on) {
   app.change(state => {
     const data = state.settings.data ??= {};
-    const off = new Set(data.off ?? []);
+    const off = new Set(listOf(data.off));
     for (const row of rows) if (on) off.delete(row); else off.add(row);
     data.off = [...off].sort((a, b) => a - b);
   }, ONLY_CUTS);
@@ -302,8 +304,10 @@ VIEWS.push({
       const there = point === null ? pointer.x : at[point];
       let index = 0;
       for (let i = 1; i < size; ++i) if (Math.abs(x[i] - there) < Math.abs(x[index] - there)) index = i;
-      const parts = header.quantities.map(({ label }, k) => {
-        const models = header.layers.map((layer, i) => [cut.names[layer], curves[(i * many + k) * size + index]])
+      const parts = header.quantities.map(({ name: quantity, label }, k) => {
+        // of what is a share of the light, the last digits are rounding
+        const rounded = value => quantity !== "intensity" && quantity !== "m00" && Math.abs(value) < CUT_NOTHING ? 0 : value;
+        const models = header.layers.map((layer, i) => [cut.names[layer], rounded(curves[(i * many + k) * size + index])])
           .filter(([, value]) => Number.isFinite(value)).map(([name, value]) => `${name} ${written(value, 4)}`);
         if (point === null) return `${label}: ${models.join(", ") || "none"}`;
         const [measured, std, deviation, weight] = [0, 1, 2, 3].map(j => points[(4 * k + j) * at.length + point]);

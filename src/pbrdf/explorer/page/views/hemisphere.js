@@ -1,5 +1,8 @@
 // The chosen quantities over the hemisphere of viewing directions.
 
+// Below this radiance, in 1/sr, planes hold no values (evaluation.py).
+const DARK = 2e-20;
+
 // Rings of zenith angles and rays of azimuths over a hemisphere, with the light, its mirror image and a cross to move.
 function directionRings() {
   const at = (zenith, azimuth) => [zenith / 90 * Math.cos(azimuth * Math.PI / 180), -zenith / 90 * Math.sin(azimuth * Math.PI / 180)];
@@ -92,7 +95,8 @@ VIEWS.push({
     const read = () => {
       const direction = pointed ?? kept;
       figures.forEach(figure => figure.rings.cross(direction));
-      const text = !direction ? hint : [`θ ${written(direction[0])}°, φ ${written(direction[1])}°`, ...board.pictures.map(value)].join(" · ");
+      const dark = direction && board.pictures.some(p => p.logarithmic && board.painter.value(p, ...direction) < DARK);
+      const text = !direction ? hint : [`θ ${written(direction[0])}°, φ ${written(direction[1])}°`, ...dark ? ["no light"] : board.pictures.map(value)].join(" · ");
       if (readout.textContent !== text) readout.textContent = text;
     };
     // Direction at a point of a picture, from its middle in radii; none outside of the hemisphere.
