@@ -7,10 +7,11 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 TEST_STAMP := $(VENV)/.installed-dev
+DOCS_STAMP := $(VENV)/.installed-docs
 # one process a core: threads of NumPy's linear algebra beside them would wait for each other
 PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --dist worksteal
 
-.PHONY: demo test quick lint benchmark fuzz clean
+.PHONY: demo test quick lint docs benchmark fuzz clean
 
 demo: $(STAMP)
 	$(BIN)/pbrdf demo --output demo
@@ -22,10 +23,15 @@ quick: lint
 	$(PYTEST) -m 'not slow' $(PYTEST_ARGS)
 
 lint: $(TEST_STAMP)
-	$(BIN)/ruff check src tests benchmarks scripts docs/examples
-	$(BIN)/ruff format --check src tests benchmarks scripts docs/examples
+	$(BIN)/ruff check src tests benchmarks scripts docs/examples docs/_ext docs/conf.py
+	$(BIN)/ruff format --check src tests benchmarks scripts docs/examples docs/_ext docs/conf.py
 	$(BIN)/lint-imports --no-cache
 	$(BIN)/mypy
+
+# the manual as a site: docs/_build/html/index.html; the tutorials run, warnings are errors, nothing is fetched but packages
+docs: $(DOCS_STAMP)
+	$(BIN)/python -m sphinx -E -W --keep-going --quiet -b html -d docs/_build/doctrees docs docs/_build/html
+	@echo "Written: docs/_build/html/index.html"
 
 benchmark: $(TEST_STAMP)
 	$(BIN)/python benchmarks/evaluation.py
@@ -58,5 +64,9 @@ $(TEST_STAMP): pyproject.toml src/pbrdf/version.py | $(VENV)/bin/python
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
 	@touch $@ $(STAMP)
 
+$(DOCS_STAMP): pyproject.toml | $(VENV)/bin/python
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[docs]'
+	@touch $@ $(STAMP)
+
 clean:
-	rm -rf $(VENV) demo build dist .pytest_cache .hypothesis .mypy_cache .ruff_cache
+	rm -rf $(VENV) demo build dist docs/_build docs/generated .pytest_cache .hypothesis .mypy_cache .ruff_cache

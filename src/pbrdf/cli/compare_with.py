@@ -100,7 +100,8 @@ def _ours(
     if matrices:
         return _array(Path(ours))
     where = directions_of(theta_i, theta_r, phi, False, None)
-    return open_single_model(ours).mueller(where["theta_i"], where["theta_r"], where["phi"])
+    matrices_of_model: np.ndarray = open_single_model(ours).mueller(*(where[x] for x in ("theta_i", "theta_r", "phi")))
+    return matrices_of_model
 
 
 def _in_words(found: ConventionComparison) -> list[str]:

@@ -354,10 +354,10 @@ def _documentation(cls: type[Model]) -> str:
     for index, extinction in complex_ones.items():
         stated[index] += f" A complex number {index} − i·{extinction} is taken apart."
     stated |= {name: choices.documentation() for name, choices in cls.options.items()}
-    lines = ["Parameters", "----------"]
+    lines = ["Every parameter may be an array (a map of paints) that broadcasts against the angles."]
+    lines += ["", "Parameters", "----------"]
     for name, sentence in stated.items():
         lines += [name, textwrap.indent(textwrap.fill(f"{sentence[0].upper()}{sentence[1:]}", 100), "    ")]
-    lines += ["", "Every parameter may be an array (a map of paints) that broadcasts against the angles."]
     lines += ["", "Raises", "------", "ModelError"]
     lines += ["    If a parameter is not finite or outside its domain, or an option is unknown."]
     return "\n".join(lines)

@@ -253,7 +253,7 @@ class _GaussianFacets(Model):
 
 
 class DoubleGauss(_GaussianFacets):
-    """Double-Gauss pBRDF (module docstring): facets that reflect plus polarised diffuse body light."""
+    """Double-Gauss pBRDF: facets that reflect plus polarised diffuse body light."""
 
     name: ClassVar[str] = "double-gauss"
     options: ClassVar[Mapping[str, Option]] = {

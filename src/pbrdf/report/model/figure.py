@@ -71,7 +71,10 @@ def _draw_hemispheres(figure: Figure, axes: list[Axes], model: Model, theta_i: f
     half = model.stokes(np.deg2rad(theta_i), np.deg2rad(theta_r)[:, None], np.deg2rad(phi)[None, :])
     # I and DoLP are even in φ: the other half is the mirror image
     intensity = np.concatenate([half[:, :0:-1, 0], half[..., 0]], axis=1)
-    dolp = np.hypot(half[..., 1], half[..., 2]) / half[..., 0]
+    with np.errstate(
+        invalid="ignore"
+    ):  # a model without a body has directions without light, and no DoLP there
+        dolp = np.hypot(half[..., 1], half[..., 2]) / half[..., 0]
     dolp = np.concatenate([dolp[:, :0:-1], dolp], axis=1)
     azimuth = np.deg2rad(np.concatenate([-phi[:0:-1], phi]))
     positive = intensity[intensity > 0.0]
@@ -111,7 +114,9 @@ def _draw_plane(axes: list[Axes], model: Model, theta_i: float) -> None:
     floor = total[:, 0].max() * 10.0**-_DECADES
     for part, stokes in parts.items():
         left.plot(s, np.where(stokes[:, 0] > 0.0, stokes[:, 0], np.nan), label=part, **styles[part])
-        right.plot(s, stokes[:, 1] / total[:, 0], label=part, **styles[part])
+        with np.errstate(invalid="ignore"):
+            share = stokes[:, 1] / total[:, 0]
+        right.plot(s, share, label=part, **styles[part])
     if total[:, 0].max() > 30.0 * total[:, 0].min():
         left.set_yscale("log")
         left.set_ylim(max(total[:, 0].min() * 0.5, floor), total[:, 0].max() * 1.5)
