@@ -1,5 +1,5 @@
-# Two commands do all the set-up: `make demo` runs the main job, `make test` passes the tests; `make quick` passes
-# those that are fast.
+# Two commands do all the set-up: `make demo` goes from a measured table to a picture, `make test` passes the tests;
+# `make quick` passes those that are fast.
 # Both make a virtual environment in .venv and install what they need. Needed: Python ≥ 3.11 and make.
 
 PYTHON ?= python3
@@ -14,7 +14,7 @@ PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --dist workstea
 .PHONY: demo test quick lint docs benchmark fuzz clean
 
 demo: $(STAMP)
-	$(BIN)/pbrdf reproduce --output demo
+	$(BIN)/pbrdf demo --output demo
 
 test: lint
 	$(PYTEST) $(PYTEST_ARGS)

@@ -32,6 +32,7 @@ NOT_RUN = {
     "stokes-reduced": "what comes of them",
     "--scheduler tcp": "a Dask scheduler",
     "SLURM_ARRAY_TASK_ID": "SLURM",
+    "pbrdf demo": "several commands, which tests/cli/test_example_and_demo_commands.py runs",
 }
 
 #: Pages that are not run, and why.

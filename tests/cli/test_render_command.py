@@ -60,7 +60,10 @@ def test_the_folder_of_a_fit_stands_for_its_model(run, tmp_path, paint):
 def test_paints_on_a_cameras_scale_are_told(run):
     result = run("render", "white", "--light", "point", *SMALL)
     assert "white reflects 1.78 of the light it gets" in result.stderr
+    assert "render white-scene, or give --albedo" in result.stderr
     assert "sphere-render/stokes.exr" in result.stdout
+    for right in (("white-scene",), ("white", "--albedo", 0.6)):
+        assert "reflects" not in run("render", *right, "--light", "point", *SMALL).stderr
 
 
 @pytest.mark.slow
@@ -208,3 +211,9 @@ def test_a_fit_with_parameters_of_each_wavelength_paints_in_colour(tmp_path):
         painted_with([source], [470.0])
     # without a wavelength it stands for one model as before
     assert len(painted_with([source], [None])[0][1]) == 1
+
+
+def test_an_albedo_is_of_one_wavelength(refused):
+    colours = ("white", "white", "white", "--wavelength", "450,550,650", "--albedo", 0.6)
+    assert "--albedo would make every colour alike" in refused("render", *colours)
+    assert "give a share above 0" in refused("render", "white", "--albedo", 2)

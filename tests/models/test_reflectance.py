@@ -9,7 +9,7 @@ from scipy.integrate import dblquad
 import independent as ref
 import pbrdf
 from pbrdf.errors import ModelError
-from pbrdf.models.reflectance import directional_hemispherical_reflectance
+from pbrdf.models.reflectance import albedo, directional_hemispherical_reflectance, with_albedo
 
 DEGREES = np.array([0.0, 30.0, 60.0, 75.0])
 LAMBERT = {"a": 0.7, "k": 1.0, "b": 0.0, "t": 0.0}
@@ -110,3 +110,23 @@ def test_shape_follows_the_angles_and_bad_angles_are_refused():
             directional_hemispherical_reflectance(matched(), angle)
     with pytest.raises(ModelError, match="no maps"):
         dhr(pbrdf.DoubleGauss([0.1, 0.2], 1.5, 0.5, 1.0, 0.0, 0.5), 30.0)
+
+
+@pytest.mark.slow
+def test_albedo_of_a_lambertian_body_is_its_own():
+    assert albedo(matched()) == pytest.approx(LAMBERT["a"], rel=1e-3)
+    for share in (0.1, 0.6, 1.0):
+        assert albedo(with_albedo(matched(), share)) == pytest.approx(share, rel=1e-9)
+
+
+@pytest.mark.slow
+def test_an_albedo_scales_what_the_amplitude_does_and_leaves_the_coating():
+    paint = pbrdf.load_paint("white")
+    scaled = with_albedo(paint, 0.6)
+    assert scaled.values["a"] == pytest.approx(pbrdf.load_paint("white-scene").values["a"], abs=1e-4)
+    assert {name for name in paint.values if paint.values[name] != scaled.values[name]} == {"a"}
+    for share, words in ((0.0, "above 0"), (1.2, "at most 1"), (0.1, "reflects 0.13 already")):
+        with pytest.raises(ModelError, match=words):
+            with_albedo(paint, share)
+    with pytest.raises(ModelError, match="no amplitude above 0"):
+        with_albedo(paint.replace(a=0.0), 0.5)

@@ -102,7 +102,11 @@ def calibrate(
     Writes an instrument for `pbrdf reduce --polarimeter`, with the accuracy that inputs held out have shown, a table
     of the inputs and a picture beside it.
 
-    `pbrdf calibrate known/ -p nominal.toml -i inputs.csv -o imager.toml`, then `pbrdf reduce run/ -p imager.toml`
+    Files to try it with: `pbrdf example known-light`
+
+    `pbrdf calibrate light/known -p light/nominal.toml -i light/inputs.csv -o imager.toml`
+
+    Then reduce with what came out: `pbrdf reduce run/ -p imager.toml`
     """
     if parametric and (grid is not None or per_pixel):
         raise PbrdfError("--parametric fits one set of settings: leave --grid and --per-pixel out")

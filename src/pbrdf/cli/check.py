@@ -20,6 +20,12 @@ def check(
     """Tell what a file of data holds, and what is wrong or suspicious in it.
 
     The exit code is 2 if the file cannot be used as it stands.
+
+    A file to try it with: `pbrdf example table`
+
+    `pbrdf check paint.csv`
+
+    A file with names of its own: `pbrdf check camera.csv --column group=position`
     """
     from pbrdf.data import check as issues_of
     from pbrdf.report.dataset.describe import columns_in_words, describe, on_the_command_line

@@ -100,7 +100,9 @@ def _ours(
     if matrices:
         return _array(Path(ours))
     where = directions_of(theta_i, theta_r, phi, False, None)
-    matrices_of_model: np.ndarray = open_single_model(ours).mueller(*(where[x] for x in ("theta_i", "theta_r", "phi")))
+    matrices_of_model: np.ndarray = open_single_model(ours).mueller(
+        *(where[x] for x in ("theta_i", "theta_r", "phi"))
+    )
     return matrices_of_model
 
 

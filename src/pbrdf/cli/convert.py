@@ -21,7 +21,12 @@ def convert(
     *,
     reading: Reading,
 ) -> None:
-    """Write a file of data in the project's own CSV, netCDF or Zarr form."""
+    """Write a file of data in the project's own CSV, netCDF or Zarr form.
+
+    A file to try it with: `pbrdf example table`
+
+    `pbrdf convert paint.csv paint.nc`
+    """
     from pbrdf.data import write
 
     require_folder_of(output)

@@ -75,7 +75,7 @@ def export(
 ) -> None:
     """Write models as files that renderers and other programs read.
 
-    For Mitsuba: `pbrdf export pearl-white --format pbsdf`
+    For Mitsuba: `pbrdf export pearl-white-scene --format pbsdf`
 
     Two wavelengths: `pbrdf export blue.json red.json --wavelength 476 --wavelength 650 -o paint.pbsdf`
     """

@@ -12,6 +12,7 @@ from pbrdf.cli.console import output_console, stage_bar, warn
 from pbrdf.cli.fit_options import fitted_model
 from pbrdf.cli.options import (
     Backend,
+    CommandGroup,
     ReadingCommand,
     library_option,
     quiet_option,
@@ -41,7 +42,9 @@ _MODEL = "double-gauss"
 _SAME_WAVELENGTH = 0.5
 
 library = typer.Typer(
+    cls=CommandGroup,
     no_args_is_help=True,
+    add_completion=False,
     help="Libraries of materials, each a mean and a scatter over specimens: what `pbrdf identify` compares with. "
     "Everywhere the library is the file that --library names, else library.json in this folder; without either the "
     "bundled paints are shown and compared with. A name that ends in .json, before all others, is the library too: "
@@ -96,7 +99,11 @@ def add(
     Fits that describe nothing are refused; those that describe their data in part, or whose parameters stand on bounds,
     are taken with a caution that the library keeps.
 
-    Two panels: `pbrdf library add white panel-1-fit panel-2-fit --library paints.json`
+    Files to try it with: `pbrdf example panels`
+
+    Two panels: `pbrdf library add pearl panels/pearl-white-1.csv panels/pearl-white-2.csv --library paints.json`
+
+    Two fits: `pbrdf library add white panel-1-fit panel-2-fit --library paints.json`
 
     One file: `pbrdf library add enamel enamel.csv --scatter sigma=0.15,n=0.02`
     """
@@ -154,7 +161,7 @@ def add(
     _say_written(file, len(changed.materials), had)
 
 
-@library.command("list")
+@library.command("list", cls=ReadingCommand)
 def list_materials(
     names: Annotated[
         list[str] | None, typer.Argument(metavar="[FILE]", help="The library.", show_default=False)
@@ -171,7 +178,7 @@ def list_materials(
     print_library(open_library(file), str(file or BUNDLED), output_console())
 
 
-@library.command()
+@library.command(cls=ReadingCommand)
 def show(
     names: Annotated[
         list[str] | None, typer.Argument(metavar="[NAME]", help="Materials.", show_default="all")
@@ -195,7 +202,7 @@ def show(
         print_material(material, console)
 
 
-@library.command()
+@library.command(cls=ReadingCommand)
 def remove(
     names: Annotated[list[str], typer.Argument(metavar="NAME", help="Materials to remove.")],
     library: _Changed = None,

@@ -17,7 +17,7 @@ def paints(as_json: AsJson = False) -> None:
     """List the bundled paints: parameters of the double-Gauss model, and their source."""
     from rich.table import Table
 
-    from pbrdf.data.paints import PAINTS, WAVELENGTH, load_paint
+    from pbrdf.data.paints import PAINTS, SCENE_ALBEDO, SCENE_PAINTS, WAVELENGTH, load_paint
     from pbrdf.models import DoubleGauss
 
     if as_json:
@@ -26,6 +26,8 @@ def paints(as_json: AsJson = False) -> None:
             "wavelength_nm": WAVELENGTH,
             "note": _SCALE,
             "paints": {name: load_paint(name).to_dict() for name in PAINTS},
+            "scene_albedo": SCENE_ALBEDO,
+            "scene_paints": {name: load_paint(name).to_dict() for name in SCENE_PAINTS},
         }
         print(json.dumps(content, indent=2, ensure_ascii=False))
         return
@@ -34,15 +36,20 @@ def paints(as_json: AsJson = False) -> None:
     listed = [p for p in DoubleGauss.parameters if p.fitted]
     for p in listed:
         table.add_column(p.symbol, justify="right")
-    for name in PAINTS:
+    for name in (*PAINTS, *SCENE_PAINTS):
         values = load_paint(name).values
         table.add_row(name, *(f"{values[p.name]:.4f}" for p in listed))
     console = output_console()
     console.print(table)
     console.print(f"\nModel double-gauss at {WAVELENGTH:g} nm. Source: {_SOURCE}; {_SCALE}.")
     console.print(
-        "Each name stands for the model in `pbrdf simulate` and `pbrdf plot`, and for a simulated "
-        "measurement in `pbrdf fit` and `pbrdf check`."
+        f"For rendering, [bold]NAME-scene[/bold]: the same paint, with a such that it reflects "
+        f"{100 * SCENE_ALBEDO:g} % under an even sky (a share of our choice); light from up to 85° is never sent back "
+        "whole."
+    )
+    console.print(
+        "Each name stands for the model in `pbrdf simulate`, `pbrdf plot` and `pbrdf render`; those of the paper also "
+        "for a simulated measurement in `pbrdf fit` and `pbrdf check`."
     )
 
 

@@ -19,12 +19,12 @@ from typing import Annotated, Any
 
 import typer
 import typer.main
-from typer.core import TyperGroup
 
 from pbrdf.cli.command_line import given_arguments, remember_arguments
 from pbrdf.cli.console import fail, warn
+from pbrdf.cli.help_page import arrange
 from pbrdf.cli.interrupt import INTERRUPTED, end, heard_at_once, say_when_interrupted, what_is_said
-from pbrdf.cli.options import ReadingCommand
+from pbrdf.cli.options import CommandGroup, ReadingCommand
 from pbrdf.cli.values import refuse_odd_numbers
 from pbrdf.errors import PbrdfError, PluginWarning
 from pbrdf.version import __version__
@@ -54,6 +54,8 @@ COMMANDS = {
     "export": "export",
     "check": "check",
     "convert": "convert",
+    "demo": "demo",
+    "example": "example",
     "compare-with": "compare_with:compare_with",
     "paints": "lists",
     "models": "lists",
@@ -79,6 +81,7 @@ class _WhenCalled(Mapping[str, Any]):
                 alone.command(name, cls=ReadingCommand)(function)
             self._loaded[name] = typer.main.get_command(alone)
             self._loaded[name].name = name
+            arrange(self._loaded[name])
         return self._loaded[name]
 
     def __contains__(self, name: object) -> bool:
@@ -91,7 +94,7 @@ class _WhenCalled(Mapping[str, Any]):
         return len(COMMANDS)
 
 
-class _Commands(TyperGroup):
+class _Commands(CommandGroup):
     """The group of all commands; turns errors that a user can mend into one line and exit code 2."""
 
     def __init__(self, **attributes: Any) -> None:
@@ -142,7 +145,6 @@ app = typer.Typer(
     cls=_Commands,
     no_args_is_help=True,
     rich_markup_mode="markdown",
-    add_completion=False,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
     pretty_exceptions_enable=False,
 )

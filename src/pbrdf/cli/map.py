@@ -185,7 +185,9 @@ def map_pixels(
 
     Exit code 3: not one pixel has a result.
 
-    A panel under several lights: `pbrdf map run-reduced/stokes.nc -g flat:fov=20 -o paint.zarr`
+    Files to try it with (reduce them first, as it says): `pbrdf example frames`
+
+    A panel under several lights: `pbrdf map frames-reduced/stokes.nc -g flat -o paint.zarr`
 
     A ball in one picture: `pbrdf map stokes.nc -g "sphere:light=40@90" --share n -o ball.zarr`
     """

@@ -12,8 +12,9 @@ from collections.abc import Callable
 from typing import Annotated, Any
 
 import typer
-from typer.core import TyperCommand
+from typer.core import TyperCommand, TyperGroup
 
+from pbrdf.cli.help_page import READING_PANEL, command_page, group_page
 from pbrdf.cli.reading import SELECTABLE, Reading
 
 __all__ = [
@@ -22,6 +23,7 @@ __all__ = [
     "AsJson",
     "Backend",
     "CalibrationError",
+    "CommandGroup",
     "DarkLevel",
     "NoProgressBar",
     "Patch",
@@ -45,7 +47,6 @@ __all__ = [
 
 _INSTRUMENTS = "paper, conservative, sony_imx250mzr, or an instrument's TOML file."
 _NAME_OR_FILE = "NAME|FILE"
-_READING_PANEL = "Reading the file"
 #: In help texts, what :class:`ReadingCommand` puts the names of the formats in place of, and the extensions of those
 #: that can be written.
 _FORMATS, WRITTEN = "FORMATS", "WRITTEN"
@@ -158,7 +159,7 @@ def source_radius_option(more: str = "") -> Any:
 
 
 def _reading_option(kind: Any, help: str, *names: str, metavar: str | None = None) -> Any:
-    return Annotated[kind, typer.Option(*names, help=help, metavar=metavar, rich_help_panel=_READING_PANEL)]
+    return Annotated[kind, typer.Option(*names, help=help, metavar=metavar, rich_help_panel=READING_PANEL)]
 
 
 _READING: dict[str, tuple[Any, Any]] = {
@@ -262,7 +263,7 @@ _READING: dict[str, tuple[Any, Any]] = {
                 show_default="so many that at most 20 000 cells are left",
                 min=1,
                 metavar="N",
-                rich_help_panel=_READING_PANEL,
+                rich_help_panel=READING_PANEL,
             ),
         ],
         None,
@@ -272,7 +273,7 @@ _READING: dict[str, tuple[Any, Any]] = {
 
 
 class ReadingCommand(TyperCommand):
-    """A command whose help names the formats that are known when it is shown, should it speak of them."""
+    """A command with a page of help; it names the formats that are known when it is shown, should it speak of them."""
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
         from pbrdf.data.readers import format_names, written_extensions
@@ -283,7 +284,14 @@ class ReadingCommand(TyperCommand):
                 if placeholder in help:
                     *first, last = names()
                     parameter.help = help.replace(placeholder, f"{', '.join(first)} or {last}")  # type: ignore[attr-defined]
-        super().format_help(ctx, formatter)
+        formatter.write(command_page(self, ctx))
+
+
+class CommandGroup(TyperGroup):
+    """A group of commands with a page of help."""
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        formatter.write(group_page(self, ctx))
 
 
 def with_reading_options(command: Callable[..., None]) -> Callable[..., None]:

@@ -93,10 +93,13 @@ def reduce(
     Writes a folder with summary.csv (means of regions), stokes.nc (every pixel), quick-look pictures, and with
     --angles one data set for each region.
 
+    Files to try it with: `pbrdf example mosaic frames`
+
     A mosaic camera: `pbrdf reduce picture.png -p sony_imx250mzr`
 
-    A measurement: `pbrdf reduce run/ -p imager.toml --angles angles.csv --roi paint=100:200,150:260`, then
-    `pbrdf fit run-reduced/paint.csv`
+    A measurement: `pbrdf reduce run/frames -p run/polarimeter.toml --angles run/angles.csv --roi paint=4:8,4:8`
+
+    Then fit what came out: `pbrdf fit frames-reduced/paint.csv`
     """
     memory = memory_size(max_memory, "--max-memory")
     if not math.isfinite(dark_level):

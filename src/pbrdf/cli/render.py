@@ -43,6 +43,13 @@ def render(
             metavar="NM[,NM,NM]",
         ),
     ] = None,
+    albedo: Annotated[
+        float | None,
+        typer.Option(
+            help="Scale each model to reflect this share of an even sky's light: for fits to a camera's counts.",
+            show_default="the models' own amplitudes",
+        ),
+    ] = None,
     light: Annotated[
         str | None,
         typer.Option(help="point, area, sky, constant, or envmap:FILE.", show_default="sky"),
@@ -95,9 +102,11 @@ def render(
 ) -> None:
     """Render painted objects as a polarisation camera sees them: S0 … S3, DoLP and AoLP.
 
-    A sphere under a clear sky: `pbrdf render white`
+    A sphere under a clear sky: `pbrdf render white-scene`
 
-    Two paints, seen through a polariser: `pbrdf render white pearl-white --scene plate --polarizer 90`
+    A fit to a camera's counts: `pbrdf render paint-fit --albedo 0.6`
+
+    Two paints, seen through a polariser: `pbrdf render white-scene pearl-white-scene --scene plate --polarizer 90`
 
     In colour: `pbrdf render blue.json green.json red.json --wavelength 450,550,650`
     """
@@ -139,6 +148,12 @@ def render(
         require_folder_of(target)
     # of each object, and in that of each wavelength
     painted = painted_with(sources, colours)
+    if albedo is not None:
+        from pbrdf.models.reflectance import with_albedo
+
+        if len(colours) > 1:
+            raise PbrdfError("--albedo would make every colour alike: leave it or --wavelength out")
+        painted = [(source, [with_albedo(model, albedo) for model in its]) for source, its in painted]
     for source, models_of_one in painted:
         for model in models_of_one:
             _warn_of_gain(source, model)
@@ -210,6 +225,7 @@ def _warn_of_gain(source: str, model: Model) -> None:
     """Say so if a paint gives off more light than it gets: its amplitude is on a camera's scale, not on a BRDF's."""
     import numpy as np
 
+    from pbrdf.cli.sources import is_paint
     from pbrdf.models.reflectance import directional_hemispherical_reflectance
 
     if any(np.ndim(value) for value in model.values.values()):
@@ -218,7 +234,9 @@ def _warn_of_gain(source: str, model: Model) -> None:
     if reflectance > 1.0:
         warn(
             f"{source} reflects {reflectance:.2f} of the light it gets: its amplitude a is on the scale of the camera "
-            "that measured it; compare no brightness with other things in the scene"
+            "that measured it; "
+            + (f"render {source}-scene, or " if is_paint(source) else "")
+            + "give --albedo, or compare no brightness with other things in the scene"
         )
 
 

@@ -66,6 +66,8 @@ def reproduce(
     Five paints → frames of the imager → Stokes vectors → stepwise inversion of camera positions 1 and 2 → prediction of
     position 3. Writes a folder with a page (index.html), figures, tables, data sets and fitted models. The paper
     published no raw data: everything is simulated, and says so.
+
+    `pbrdf reproduce -o paper`
     """
     from pbrdf.files.atomic import require_writable_folder
     from pbrdf.reproduction.experiment.measurement import Options

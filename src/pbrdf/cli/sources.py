@@ -75,7 +75,7 @@ def known_wavelength(source: str) -> float | None:
 
 
 def is_paint(source: str) -> bool:
-    """Whether this names a bundled paint; a file of that name goes before."""
-    from pbrdf.data.paints import PAINTS
+    """Whether this names a bundled paint or its companion for rendering; a file of that name goes before."""
+    from pbrdf.data.paints import PAINTS, SCENE_PAINTS
 
-    return source in PAINTS and not Path(source).exists()
+    return (source in PAINTS or source in SCENE_PAINTS) and not Path(source).exists()

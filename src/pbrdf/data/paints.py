@@ -1,7 +1,9 @@
 """Bundled paints and the bundled virtual experiment.
 
 The parameters are Table 1 of Zhang, Song, Zhao, Infrared and Laser Engineering 46(11), 1117002 (2017), for
-476 nm; the amplitude ``a`` is on that paper's camera scale, so these paints reflect more than they receive.
+476 nm; the amplitude ``a`` is on that paper's camera scale, so these paints reflect more than they receive. Each has a
+companion for rendering, ``NAME-scene``, whose ``a`` alone is another: scaled so that under an even sky the paint
+reflects the share :data:`SCENE_ALBEDO`, a round number of ours, for the paper states none.
 The measurements are simulated by ``scripts/make_bundled_experiment.py``: the paper published no raw data.
 """
 
@@ -17,7 +19,7 @@ from pbrdf.models import DoubleGauss
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["PAINTS", "WAVELENGTH", "load_paint", "open_experiment"]
+__all__ = ["PAINTS", "SCENE_ALBEDO", "SCENE_PAINTS", "WAVELENGTH", "load_paint", "open_experiment"]
 
 #: Wavelength of Table 1 in nm.
 WAVELENGTH = 476.0
@@ -31,22 +33,34 @@ PAINTS: dict[str, tuple[float, float, float, float, float, float]] = {
     "cd-back": (0.0346, 1.7420, 1.4927, 1.1945, 0.2749, 0.4686),
 }
 
+#: Share of an even sky's light that the companions for rendering reflect, :func:`pbrdf.models.reflectance.albedo`.
+SCENE_ALBEDO = 0.6
 
-def _known(name: str) -> str:
-    if name not in PAINTS:
-        raise DataError(f"no bundled paint is named {name!r}: choose one of {', '.join(PAINTS)}")
-    return name
+#: Diffuse amplitude ``a`` of the companions by name, from :func:`pbrdf.models.reflectance.with_albedo`.
+SCENE_PAINTS: dict[str, float] = {
+    "white-scene": 0.5724,
+    "matte-white-thin-scene": 0.7633,
+    "matte-white-thick-scene": 0.6758,
+    "pearl-white-scene": 2.8331,
+    "cd-back-scene": 0.6500,
+}
 
 
 def load_paint(name: str) -> DoubleGauss:
-    """The double-Gauss model of a bundled paint.
+    """The double-Gauss model of a bundled paint, or of its companion for rendering, ``NAME-scene``.
 
     Raises
     ------
     DataError
         If there is no such paint; the names are listed.
     """
-    return DoubleGauss(*PAINTS[_known(name)])
+    if name in SCENE_PAINTS:
+        return load_paint(name.removesuffix("-scene")).replace(a=SCENE_PAINTS[name])
+    if name not in PAINTS:
+        raise DataError(
+            f"no bundled paint is named {name!r}: choose one of {', '.join(PAINTS)}, for rendering NAME-scene"
+        )
+    return DoubleGauss(*PAINTS[name])
 
 
 def open_experiment(name: str) -> xr.Dataset:
@@ -57,6 +71,8 @@ def open_experiment(name: str) -> xr.Dataset:
     DataError
         If there is no such paint; the names are listed.
     """
-    file = resources.files("pbrdf.data") / "experiment" / f"{_known(name)}.csv"
+    if name not in PAINTS:
+        raise DataError(f"no bundled measurement is named {name!r}: choose one of {', '.join(PAINTS)}")
+    file = resources.files("pbrdf.data") / "experiment" / f"{name}.csv"
     with resources.as_file(file) as path:
         return read(path, format="csv")

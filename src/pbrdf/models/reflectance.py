@@ -1,4 +1,4 @@
-"""How much of the light a surface reflects: directional-hemispherical reflectance of any model."""
+"""How much of the light a surface reflects: from one direction, from all of them, and models scaled to a share."""
 
 from __future__ import annotations
 
@@ -11,12 +11,14 @@ from pbrdf.errors import ModelError
 from pbrdf.models.base import Model
 from pbrdf.models.evaluation import brdf
 
-__all__ = ["directional_hemispherical_reflectance"]
+__all__ = ["albedo", "directional_hemispherical_reflectance", "with_albedo"]
 
 #: Nodes of the specular integral: radius, and direction; half of the radii lie within MIDDLE widths of the lobe.
 RADII, DIRECTIONS, MIDDLE = 128, 96, 3.0
 #: Nodes of the diffuse integral: √cosθ_r and azimuth.
 ZENITHS, AZIMUTHS = 64, 32
+#: Nodes of the integral over the directions of an even sky.
+INCIDENCES = 24
 
 
 def directional_hemispherical_reflectance(model: Model, theta_i: ArrayLike) -> np.ndarray:
@@ -58,6 +60,50 @@ def directional_hemispherical_reflectance(model: Model, theta_i: ArrayLike) -> n
         angles.shape
     )
     return values
+
+
+def albedo(model: Model) -> float:
+    """Share of the light of an even sky that a surface reflects: 2 ∫ DHR(θ_i) cosθ_i sinθ_i dθ_i.
+
+    Raises
+    ------
+    ModelError
+        If the model's parameters are arrays.
+    """
+    node, weight = np.polynomial.legendre.leggauss(INCIDENCES)
+    # over sin²θ_i, whose differential is 2 cosθ_i sinθ_i dθ_i
+    theta_i = np.arcsin(np.sqrt(0.5 * (node + 1.0)))
+    return float(directional_hemispherical_reflectance(model, theta_i) @ (0.5 * weight))
+
+
+def with_albedo(model: Model, share: float) -> Model:
+    """The same model on the scale of a scene: its amplitudes such that :func:`albedo` is `share`.
+
+    Parameters
+    ----------
+    model
+        Of single parameters. What its amplitudes do not scale (a coating that reflects by Fresnel's equations alone)
+        stays as it is.
+    share
+        Albedo wanted, above 0 and at most 1.
+
+    Raises
+    ------
+    ModelError
+        If the share is out of range, the model has no amplitude, or what stays as it is reflects more already.
+    """
+    if not 0.0 < share <= 1.0:
+        raise ModelError(f"an albedo of {share:g}: give a share above 0 and at most 1")
+    amplitudes = {p.name: model.values[p.name] for p in model.parameters if p.amplitude}
+    whole, rest = albedo(model), albedo(model.replace(**dict.fromkeys(amplitudes, 0.0)))
+    if not whole > rest:
+        raise ModelError(f"{model.name} has no amplitude above 0 that could be scaled to an albedo")
+    if share <= rest:
+        raise ModelError(
+            f"an albedo of {share:g} cannot be had: what no amplitude scales, its coating, reflects {rest:.2g} already"
+        )
+    factor = (share - rest) / (whole - rest)
+    return model.replace(**{name: factor * value for name, value in amplitudes.items()})
 
 
 def _specular_reflectance(model: Model, theta_i: np.ndarray) -> np.ndarray:

@@ -5,7 +5,7 @@ Nothing here imports Mitsuba before it is needed::
     import pbrdf.rendering
 
     pbrdf.rendering.register()                       # every variant knows the plugin from now on
-    bsdf = pbrdf.rendering.bsdf_dict(pbrdf.load_paint("matte-white-thick"))
+    bsdf = pbrdf.rendering.bsdf_dict(pbrdf.load_paint("matte-white-thick-scene"))
 """
 
 from __future__ import annotations
