@@ -65,7 +65,7 @@ def _links_within(app: Any, name: str, source: list[str]) -> None:
         path = (here / target.partition("#")[0]).resolve()
         if path == BENCHMARKS:
             return f"[{words}](/generated/benchmarks.md)"
-        return words if path.is_dir() else link.group()
+        return words if path.is_dir() or path.suffix == ".md" else link.group()
 
     source[0] = re.sub(r"\[([^\[\]]*)\]\((\.\./[^()\s]*)\)", within, source[0])
 
