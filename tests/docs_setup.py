@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 import pbrdf
 from docs_pages import PAGES, pieces
 from pbrdf.cli.main import app
+from pbrdf.data.convention_comparison import flat_reflection
 from pixel_helpers import blank, painted
 
 #: Commands that are not run, known by a part of them, and why.
@@ -193,6 +194,17 @@ def _model_comparison() -> None:
     _own_model_file()
 
 
+def _neighbours() -> None:
+    _fit("my-fit")
+    np.save("gold.npy", flat_reflection(np.deg2rad([30.0, 70.0]), 0.47, 2.83))
+    theta_r, phi = np.meshgrid(
+        np.deg2rad(np.arange(0, 81, 5)), np.deg2rad(np.arange(0, 361, 15)), indexing="ij"
+    )
+    matrices = pbrdf.load_paint("white").mueller(np.deg2rad(20.0), theta_r, phi)
+    for name in ("theirs.npy", "ours.npy"):
+        np.save(name, matrices)
+
+
 def _own_model_file() -> None:
     """``mymodel.py`` holds the class of the page on models of one's own."""
     source = next(piece.text for piece in pieces(PAGES["own-model"]) if piece.kind == "python")
@@ -240,6 +252,7 @@ _FILES: dict[str, Callable[[], None]] = {
     "instruments": _instruments,
     "maps": _maps,
     "model-comparison": _model_comparison,
+    "neighbours": _neighbours,
     "own-model": _own_model,
     "real-data": _real_data,
     "reduction": _reduction,
