@@ -66,7 +66,7 @@ def test_what_was_measured_is_drawn_first(workspace, white):
 def test_the_light_begins_at_a_measured_angle():
     angles = np.deg2rad([[20.0, 20.0, 50.0, 60.0], [30.0, 50.0, 30.0, 50.0], [0.0, 0.0, 0.0, 0.0]])
     assert beginning(pbrdf.make_dataset(*angles, quantity="brdf", I=np.ones(4))) == {
-        "theta_i": 50.0,
+        "theta_i": 20.0,
         "quantities": [],
     }
     ratios = {"Q_over_I": np.zeros(4), "V_over_I": np.zeros(4)}
