@@ -3,6 +3,7 @@
 import asyncio
 import http.server
 import threading
+from urllib.parse import urlsplit
 
 import pytest
 
@@ -77,30 +78,52 @@ def test_a_page_of_elsewhere_gets_nothing(served, page, foreign, white):
     assert frame.query_selector("canvas") is None and "explorer" not in frame.content()
 
 
-def test_a_program_that_ends_is_said(page, white):
-    """The page says so itself; the server does not wait for it."""
+def test_a_program_that_ends_is_said_and_one_that_is_started_anew(page, white):
+    """The page says so itself; the server does not wait for it, and another start is not asked for ever."""
     from pbrdf.explorer.server import serve
 
-    ready, address, loop = threading.Event(), [], asyncio.new_event_loop()
+    def start(port):
+        ready, address, loop = threading.Event(), [], asyncio.new_event_loop()
+        running = []
 
-    def tell(text):
-        address.append(text)
-        ready.set()
+        def tell(text):
+            address.append(text)
+            ready.set()
 
-    def run():
-        asyncio.set_event_loop(loop)
-        task = loop.create_task(serve(lambda: Workspace([("white", white)]), 0, tell))
-        running.append(task)
-        loop.run_until_complete(asyncio.gather(task, return_exceptions=True))
-        loop.close()
+        def run():
+            asyncio.set_event_loop(loop)
+            task = loop.create_task(serve(lambda: Workspace([("white", white)]), port, tell))
+            running.append(task)
+            loop.run_until_complete(asyncio.gather(task, return_exceptions=True))
+            loop.close()
 
-    running = []
-    thread = threading.Thread(target=run)
-    thread.start()
-    assert ready.wait(30)
-    page.goto(address[0])
+        thread = threading.Thread(target=run)
+        thread.start()
+
+        def end():
+            loop.call_soon_threadsafe(running[0].cancel)
+            thread.join(10)
+            assert not thread.is_alive()
+
+        assert ready.wait(30)
+        return address[0], end
+
+    address, end = start(0)
+    page.goto(address)
     page.wait_for_selector("canvas")
-    loop.call_soon_threadsafe(running[0].cancel)
-    thread.join(10)
-    assert not thread.is_alive()
+    end()
     page.get_by_text("pbrdf explore").first.wait_for(timeout=10_000)
+    _, end = start(urlsplit(address).port)
+    try:
+        gone = page.locator(".notice.gone")
+        gone.get_by_text("was started anew").wait_for(timeout=20_000)
+        tried = []
+        page.on("websocket", lambda socket: tried.append(socket))
+        page.wait_for_timeout(2000)
+        assert tried == []
+        # nothing that is asked for waits for ever
+        page.locator("input[type=range][name=sigma]").press("ArrowRight")
+        page.wait_for_function("() => location.hash.length > 9")
+        assert gone.is_visible()
+    finally:
+        end()

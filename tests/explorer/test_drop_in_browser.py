@@ -1,5 +1,6 @@
 """Files that fall on the page in Chromium: data, models, tables that leave something unsaid, and hostile ones."""
 
+import base64
 import json
 from importlib import resources
 
@@ -10,6 +11,7 @@ from pbrdf.explorer.workspace import Workspace
 pytestmark = pytest.mark.slow
 
 TABLE = (resources.files("pbrdf.data") / "experiment" / "white.csv").read_text(encoding="utf-8")
+SETTINGS = {"page": {"views": ["hemisphere"]}, "cuts": {"along": "phi"}}
 DROP = """([name, text, bytes]) => {
   const files = new DataTransfer();
   files.items.add(new File([text ?? new Uint8Array(bytes)], name));
@@ -28,12 +30,12 @@ def said(page, text):
 @pytest.fixture
 def workspace(white):
     found = Workspace([("white", white)])
-    state = {**found.state(), "settings": {"page": {"views": ["hemisphere"]}}}
+    state = {**found.state(), "quantities": ["v"], "settings": SETTINGS}
     found.state = lambda: state
     return found
 
 
-def test_data_are_opened_while_a_slider_moves(served, page, workspace):
+def test_data_are_opened_while_a_slider_moves(served, page, workspace, white):
     page.goto(served(lambda: workspace))
     page.wait_for_selector(".card canvas")
     page.on("websocket", lambda socket: pytest.fail("another connection"))
@@ -44,7 +46,16 @@ def test_data_are_opened_while_a_slider_moves(served, page, workspace):
     slider.press("ArrowRight")
     assert page.locator("input.number").first.input_value() != before
     said(page, "paint.csv is open.")
-    assert [name for name, _ in workspace.datasets] == ["paint.csv"]
+    ((name, dataset),) = workspace.datasets
+    assert name == "paint.csv"
+    # it is shown as if the program had been started with it
+    page.wait_for_function("() => location.hash")
+    page.evaluate("() => new Promise(done => setTimeout(done, 400))")
+    code = page.url.partition("#state=")[2]
+    state = json.loads(base64.urlsafe_b64decode(code + "=" * (-len(code) % 4)))
+    begins = Workspace([("white", white)], [(name, dataset)]).state()
+    assert state["light"] == begins["light"] and state["quantities"] == begins["quantities"]
+    assert state["settings"] == {**SETTINGS, "cuts": {}, "data": {"set": name}}
     # a model is shown at once
     drop(page, "mine.json", json.dumps(workspace.models[0][1].to_dict()))
     said(page, "mine.json is open.")

@@ -170,7 +170,12 @@ def test_what_the_page_is_told(white):
     )
     header, [buffer] = hemisphere.draw(shown, Workspace(), True)
     assert header["grid"] == [181, 181]
-    assert buffer.nbytes == 3 * 181 * 181 * 2
+    # the last is DoLP, for the angles alone
+    assert buffer.nbytes == 4 * 181 * 181 * 2
+    assert [p.get("polarised") for p in header["pictures"]] == [None, [3, 3], None]
+    strength = np.frombuffer(buffer, np.float16).reshape(4, 181, 181)[3]
+    whole_dolp = fields(shown, ("dolp",), hemisphere.GRID, True)[1][0]
+    np.testing.assert_allclose(strength.astype(float), whole_dolp.astype(float), atol=1e-3)
     assert [p["colours"] for p in header["pictures"]] == ["sequential", "cyclic", "signed"]
     assert [p["range"] for p in header["pictures"]] == [None, None, (-0.5, 0.5)]
     header, [buffer] = mueller.draw(shown, Workspace(), True)

@@ -140,6 +140,27 @@ def test_reading_values_by_keyboard_and_pointer(served, page, white):
     assert cells.nth(5).get_attribute("aria-pressed") == "true"
 
 
+def test_where_nothing_is_polarised_there_is_no_angle(served, page, white):
+    """Along the normal an isotropic surface in light along it polarises nothing: no colour, and no number."""
+    changes = {
+        "quantities": ["aolp"],
+        "light": {"theta_i": 0.0, "stokes": [1.0, 0.0, 0.0, 0.0]},
+        "settings": {"page": {"views": ["hemisphere"]}},
+    }
+    page.goto(served(lambda: Shown([("white", white)], changes)))
+    board = page.locator(".board")
+    board.locator("canvas").first.wait_for()
+    middle, far = page.evaluate(PIXELS, [[0.0, 0.0], [70.0, 20.0]])[0]["pixels"]
+    assert middle["rgba"][3] < 10 and far["rgba"][3] == 255
+    board.focus()
+    page.keyboard.press("ArrowRight")
+    assert page.locator(".readout").inner_text() == "θ 1°, φ 0° · AoLP none"
+    for _ in range(7):
+        page.keyboard.press("Shift+ArrowRight")
+    # body light comes out polarised along p
+    assert page.locator(".readout").inner_text() == "θ 71°, φ 0° · AoLP 0°"
+
+
 def test_where_there_is_no_light_no_number_is_read(served, page):
     """A surface without body light is black far from its lobe: neither dark nor polarised in numbers."""
     kind = find_model("priest-germer")

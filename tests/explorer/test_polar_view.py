@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pbrdf import DoubleGauss
+from pbrdf import DoubleGauss, load_paint
 from pbrdf.explorer.state import Layer, Light, State, StateError
 from pbrdf.explorer.views import polar
 from pbrdf.explorer.workspace import Workspace
@@ -87,6 +87,19 @@ def test_a_logarithmic_scale_ends_at_its_decades(paint):
     assert distance.max() == 1.0
     lit = share > 10.0**-polar.DECADES
     np.testing.assert_allclose(10.0 ** (polar.DECADES * (distance[lit] - 1.0)), share[lit], rtol=1e-2)
+
+
+def test_a_narrow_lobe_is_logarithmic_until_a_scale_is_chosen(paint):
+    narrow = load_paint("white")
+
+    def scales(model, **settings):
+        state = State((Layer("a", model),), light=Light(40.0), settings={"polar": settings})
+        return [polar.draw(state, Workspace(), dragging)[0]["scale"] for dragging in (False, True)]
+
+    assert scales(paint) == ["linear"] * 2
+    assert scales(narrow) == ["logarithmic"] * 2
+    assert scales(narrow, scale="linear") == ["linear"] * 2
+    assert scales(narrow, quantity="dolp") == scales(narrow, quantity="aolp") == ["linear"] * 2
 
 
 def test_what_is_hidden_is_left_out_and_the_active_model_comes_first(paint):

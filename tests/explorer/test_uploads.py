@@ -15,7 +15,7 @@ from pbrdf.explorer import uploads
 from pbrdf.explorer.session import Session
 from pbrdf.explorer.upload_process import LIMITS
 from pbrdf.explorer.uploads import MOST_BYTES, file_name, open_apart
-from pbrdf.explorer.workspace import Workspace
+from pbrdf.explorer.workspace import Workspace, beginning
 
 TABLE = (resources.files("pbrdf.data") / "experiment" / "white.csv").read_bytes()
 
@@ -76,6 +76,7 @@ def test_a_table_is_opened_while_pictures_are_drawn(page, white, monkeypatch):
         assert page.heard.wait_for(lambda: len(page.sent) == 2, 60)
     answer = page.sent[-1]
     assert (answer["type"], answer["id"], answer["name"]) == ("opened", 7, "x.csv")
+    assert answer["beginning"] == beginning(page.session.workspace.datasets[0][1])
     assert answer["datasets"] == ["x.csv"] and "63 geometries" in " ".join(answer["lines"])
     ((name, dataset),) = page.session.workspace.datasets
     assert name == "x.csv" and dataset.identical(pbrdf.open_experiment("white"))

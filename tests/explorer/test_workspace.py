@@ -7,7 +7,7 @@ import pbrdf
 from pbrdf.errors import PbrdfError
 from pbrdf.explorer.opening import is_map, open_source
 from pbrdf.explorer.state import read_state
-from pbrdf.explorer.workspace import MOST_OPEN, Workspace
+from pbrdf.explorer.workspace import MOST_OPEN, Workspace, beginning
 
 
 @pytest.fixture
@@ -61,6 +61,16 @@ def test_what_was_measured_is_drawn_first(workspace, white):
     ratios[:, 2, 2], ratios[:, 0, 1] = M[:, 2, 2] / M[:, 0, 0], M[:, 0, 1] / M[:, 0, 0]
     workspace.add_dataset("ratios", pbrdf.make_dataset(*angles, mueller_over_m00=ratios))
     assert workspace.state()["quantities"] == ["m01", "m22"]
+
+
+def test_the_light_begins_at_a_measured_angle():
+    angles = np.deg2rad([[20.0, 20.0, 50.0, 60.0], [30.0, 50.0, 30.0, 50.0], [0.0, 0.0, 0.0, 0.0]])
+    assert beginning(pbrdf.make_dataset(*angles, quantity="brdf", I=np.ones(4))) == {
+        "theta_i": 20.0,
+        "quantities": [],
+    }
+    ratios = {"Q_over_I": np.zeros(4), "V_over_I": np.zeros(4)}
+    assert beginning(pbrdf.make_dataset(*angles, **ratios))["quantities"] == ["q", "v"]
 
 
 @pytest.mark.slow

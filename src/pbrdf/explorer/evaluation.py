@@ -73,6 +73,10 @@ class Picture:
     extent: tuple[float, float]
 
 
+#: Beside the quantities: DoLP, of two models the lower, which says where their angles of polarisation mean something.
+POLARISED = "polarised"
+
+
 @lru_cache(maxsize=8)
 def _angles(grid: Grid, Float: Any) -> tuple[Any, Any]:
     """Zenith angles and azimuths of a grid in Dr.Jit's memory, radians."""
@@ -150,7 +154,7 @@ def _value(quantity: str, S: Sequence[Any], M: Sequence[Sequence[Any]]) -> Any:
 
     if quantity == "intensity":
         return _log10(S[0])
-    if quantity == "dolp":
+    if quantity in ("dolp", POLARISED):
         q, u = _ratio(S[1], S[0]), _ratio(S[2], S[0])
         return dr.sqrt(q * q + u * u)
     if quantity == "aolp":
@@ -175,6 +179,8 @@ def _sign(quantity: str) -> float:
 def _difference(quantity: str, first: Any, second: Any) -> Any:
     import drjit as dr
 
+    if quantity == POLARISED:
+        return dr.minimum(first, second)
     difference = first - second
     # axes differ by a right angle at most
     return difference - 180.0 * dr.round(difference / 180.0) if quantity == "aolp" else difference

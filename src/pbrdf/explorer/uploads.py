@@ -30,7 +30,7 @@ from pbrdf.errors import DataError, PbrdfError
 from pbrdf.explorer.catalogue import layer_of
 from pbrdf.explorer.messages import error_answer
 from pbrdf.explorer.upload_process import LIMITS, Limits
-from pbrdf.explorer.workspace import Workspace
+from pbrdf.explorer.workspace import Workspace, beginning
 
 __all__ = ["MOST_BYTES", "OPTIONS", "answer", "file_name", "open_apart"]
 
@@ -138,6 +138,7 @@ def _opened(name: str, content: bytes, options: Mapping[str, Any], workspace: Wo
         "name": name,
         "layers": [layer_of(own, model) for own, model in found.models],
         "datasets": [own for own, _ in datasets],
+        "beginning": beginning(datasets[0][1]) if datasets else None,
         "lines": [line for _, dataset in datasets for line in describe(dataset)],
         "maps": maps,
     }

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from pbrdf.inversion.map_store import MapSource
     from pbrdf.inversion.result import FitResult
 
-__all__ = ["MOST_OPEN", "Workspace"]
+__all__ = ["MOST_OPEN", "Workspace", "beginning"]
 
 #: Data sets that are open at once, at most.
 MOST_OPEN = 64
@@ -152,9 +152,9 @@ class Workspace:
         if self.maps:
             state["settings"]["page"] = {"views": list(_VIEWS_OF_MAPS)}
         if self.datasets:
-            measured = np.rad2deg(self.datasets[0][1]["theta_i"].values)
-            state["light"]["theta_i"] = round(float(np.median(measured)), 3)
-            state["quantities"] = _quantities(self.datasets[0][1]) or state["quantities"]
+            first = beginning(self.datasets[0][1])
+            state["light"]["theta_i"] = first["theta_i"]
+            state["quantities"] = first["quantities"] or state["quantities"]
         return state
 
     def close(self) -> None:
@@ -162,6 +162,20 @@ class Workspace:
         while self.at_close:
             with suppress(Exception):
                 self.at_close.pop()()
+
+
+def beginning(dataset: xr.Dataset) -> dict[str, Any]:
+    """What is shown first of measured data.
+
+    Returns
+    -------
+    dict
+        ``theta_i``, the measured angle of incidence in the middle of all, degrees; ``quantities``, empty where those
+        of a new page suit them.
+    """
+    measured = np.rad2deg(dataset["theta_i"].values)
+    middle = np.percentile(measured, 50.0, method="lower")
+    return {"theta_i": round(float(middle), 3), "quantities": _quantities(dataset)}
 
 
 def model_name(dataset: xr.Dataset) -> str:

@@ -21,7 +21,7 @@ class Application {
     this.ending = new AbortController();
     this.signal = this.ending.signal;
     this.hear = (content, buffers) => this.receive(content, buffers ?? []);
-    this.lose = why => { this.drawing = false; this.tell("disconnected", why); };
+    this.lose = (why, anew) => { this.drawing = false; this.tell("disconnected", why, anew); };
     // what was asked for meanwhile went nowhere
     this.find = () => { this.drawing = false; this.tell("connected"); };
     model.on("msg:custom", this.hear);

@@ -209,11 +209,11 @@ function noticesOf(app) {
     if (!stays) timer = setTimeout(() => { box.hidden = true; }, 12000);
   });
   const node = element("div", { class: "notices" }, gone, box);
-  node.lost = (is, why) => {
+  node.lost = (is, why, anew) => {
     gone.hidden = lost.hidden = !is;
-    lost.textContent = !is ? "" : why ? `This page cannot be served: ${why}; trying again.` : "The program behind this page does not answer; trying again. If it has ended, start pbrdf explore anew and open the address that it tells: the part of this page's address after # shows the same there.";
+    lost.textContent = !is ? "" : anew ? "The program was started anew, which this page does not belong to: open its new address. The part of this page's address after # shows the same there." : why ? `This page cannot be served: ${why}; trying again.` : "The program behind this page does not answer; trying again. If it has ended, start pbrdf explore anew and open the address that it tells: the part of this page's address after # shows the same there.";
   };
-  app.on("disconnected", why => node.lost(true, why));
+  app.on("disconnected", (why, anew) => node.lost(true, why, anew));
   return node;
 }
 

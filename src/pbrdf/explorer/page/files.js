@@ -21,12 +21,13 @@ function openFiles(app, el) {
       else await asker.send(file);
     }
   }
-  app.on("answer:opened", ({ name, layers, datasets, maps }) => {
+  app.on("answer:opened", ({ name, layers, datasets, beginning, maps }) => {
     const begins = !app.state;
     app.tell("note", `${name} is open.`);
     for (const layer of layers) addLayer(app, layer);
     // data want a model beside them
     if (!app.state && datasets.length + maps.length) addLayer(app, defaultLayer(app, Object.keys(app.catalogue.models)[0]));
+    if (datasets.length) showData(app, datasets[0], beginning);
     if (maps.length) showMap(app, maps[0], begins && !datasets.length ? ["cuts"] : FIRST_VIEWS);
   });
 
@@ -41,6 +42,18 @@ function openFiles(app, el) {
     take([...event.dataTransfer.files]);
   });
   return { choose: () => input.click(), take, close: asker.close };
+}
+
+// Data that were opened here begin as those that the program was started with: the light at a measured angle, what was
+// measured, along a line of theirs.
+function showData(app, set, { theta_i, quantities }) {
+  app.change(state => {
+    const { settings } = state;
+    settings.data = { set };
+    state.light.theta_i = theta_i;
+    state.quantities = quantities.length ? quantities : [...app.catalogue.blank.quantities];
+    if (settings.cuts) for (const name of ["along", "cut"]) delete settings.cuts[name];
+  });
 }
 
 // The state that a file holds, null where it holds something else.

@@ -138,7 +138,8 @@ function levelTable(text) {
   return levelTables.get(text);
 }
 
-// Paints one picture after the other, each { plane, mirrored, sign, colours } of planes of float16 numbers.
+// Paints one picture after the other, each { plane, mirrored, sign, colours } of planes of float16 numbers; of
+// angles `polarised` are the planes of DoLP for both halves.
 class HemispherePainter {
   constructor(tables) {
     this.tables = tables;
@@ -187,12 +188,23 @@ class HemispherePainter {
       paintHalf(pixels, map.below, map.below, map, field, this.columns, table, cyclic);
     }
     const bytes = canvas.image.data, { rim, above, below } = map;
-    for (let k = 0; k < rim.length; k += 2) bytes[4 * above[rim[k]] + 3] = bytes[4 * below[rim[k]] + 3] = rim[k + 1];
+    picture.polarised?.forEach((plane, i) => {
+      const numbers = allHalfNumbers(), strength = Float32Array.from(this.values.subarray(plane * length, (plane + 1) * length), bits => numbers[bits]);
+      if (strength.some(dolp => dolp < FADED)) fadeHalf(pixels, i ? below : above, map, strength, this.columns);
+    });
+    for (let k = 0; k < rim.length; k += 2) for (const places of [above, below]) {
+      const at = 4 * places[rim[k]] + 3;
+      bytes[at] = Math.min(bytes[at], rim[k + 1]);
+    }
     context.putImageData(canvas.image, 0, 0);
   }
 
-  // Value of a picture at a direction in degrees.
+  // Value of a picture at a direction in degrees; null where there is no angle.
   value(picture, zenith, azimuth) {
+    if (picture.polarised) {
+      const [plane, mirrored] = picture.polarised;
+      if (angleIsNone(this.value({ plane, mirrored, sign: 1 }, zenith, azimuth))) return null;
+    }
     const turn = Math.abs(((azimuth + 180) % 360 + 360) % 360 - 180), ahead = Math.sin(azimuth * Math.PI / 180) >= 0;
     const r = zenith / 90 * (this.rows - 1), c = turn / 180 * (this.columns - 1);
     const r0 = Math.min(Math.floor(r), this.rows - 2), c0 = Math.min(Math.floor(c), this.columns - 2);
@@ -205,6 +217,26 @@ class HemispherePainter {
     const value = row(0) * (1 - r + r0) + row(1) * (r - r0);
     if (cyclic) return value - 180 * Math.round(value / 180);
     return picture.logarithmic ? 10 ** value : value;
+  }
+}
+
+// How much of its colour an angle of polarisation keeps, by DoLP: noise has an angle, too.
+const FADED = 0.01;
+function shareOfAngle(dolp) {
+  const share = Math.min(dolp / FADED, 1);
+  return share * share * (3 - 2 * share);
+}
+// In words there is no angle below half of that.
+const angleIsNone = dolp => dolp < FADED / 2;
+
+// Let a half of a picture fade into what is behind it, by the DoLP in the directions.
+function fadeHalf(pixels, places, { corner, weights }, strength, columns) {
+  for (let k = 0; k < corner.length; k++) {
+    const at = corner[k], wr = (weights[k] >> 8) / 255, wc = (weights[k] & 255) / 255;
+    const upper = strength[at] + (strength[at + 1] - strength[at]) * wc;
+    const lower = strength[at + columns] + (strength[at + columns + 1] - strength[at + columns]) * wc;
+    const alpha = Math.round(255 * shareOfAngle(upper + (lower - upper) * wr));
+    pixels[places[k]] = pixels[places[k]] & 0xffffff | alpha << 24;
   }
 }
 

@@ -34,6 +34,14 @@ const SOON = 500, LATE = 8000;
 // Code of a connection that is closed as there are too many.
 const FULL = 1013;
 
+// Whether another start of the program answers here, whose token this page does not have; sockets do not say why they
+// were refused.
+async function tokenIsRefused() {
+  try {
+    return (await fetch("/", { cache: "no-store", signal: AbortSignal.timeout(LATE) })).status === 403;
+  } catch { return false; }
+}
+
 // What AnyWidget gives a module: values by name and custom messages.
 class SocketModel {
   constructor(address) {
@@ -42,23 +50,31 @@ class SocketModel {
     this.waiting = [];
     this.address = address;
     this.pause = SOON;
+    this.over = false;
     this.connect();
   }
   // A lost connection is tried again, at first soon; what was to be sent meanwhile is not: the page asks anew.
   connect() {
     const again = Boolean(this.socket);
+    let taken = false;
     this.socket = new WebSocket(this.address);
     this.socket.binaryType = "arraybuffer";
     this.socket.onopen = () => {
+      taken = true;
       this.pause = SOON;
       const waiting = this.waiting;
       this.waiting = [];
       if (again) this.tell("connected"); else waiting.forEach(f => this.socket.send(f));
     };
     this.socket.onmessage = event => this.tell("msg:custom", ...unpack(event.data));
-    this.socket.onclose = event => {
+    this.socket.onclose = async event => {
       // the server says why it takes no more pages
       this.tell("disconnected", event.code === FULL ? event.reason : "");
+      if (!taken && await tokenIsRefused()) {
+        this.over = true;
+        this.tell("disconnected", "", true);
+        return;
+      }
       setTimeout(() => this.connect(), this.pause);
       this.pause = Math.min(2 * this.pause, LATE);
     };
@@ -71,7 +87,9 @@ class SocketModel {
   tell(event, ...values) { (this.listeners.get(event) ?? []).forEach(listener => listener(...values)); }
   send(content, callbacks, buffers = []) {
     const frame = pack(content, buffers);
-    if (this.socket.readyState === WebSocket.OPEN) this.socket.send(frame); else this.waiting.push(frame);
+    if (this.socket.readyState === WebSocket.OPEN) this.socket.send(frame);
+    else if (this.over) queueMicrotask(() => this.tell("disconnected", "", true));
+    else this.waiting.push(frame);
   }
 }
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from pbrdf.explorer.evaluation import Grid, described, fields, prepare
+from pbrdf.explorer.evaluation import POLARISED, Grid, described, fields, prepare
 from pbrdf.explorer.state import QUANTITIES, State, StateError, number
 from pbrdf.explorer.workspace import Workspace
 
@@ -29,13 +29,19 @@ def draw(state: State, workspace: Workspace, dragging: bool) -> tuple[dict[str, 
     """
     difference = state.compare is not None
     ranges = _ranges(state.settings.get("hemisphere", {}))
-    pictures, planes = fields(state, state.quantities, GRID, dragging)
+    # angles of polarisation fade where there is none
+    hidden = (POLARISED,) if "aolp" in state.quantities else ()
+    asked = (*state.quantities, *hidden)
+    found, planes = fields(state, asked, GRID, dragging)
     if not dragging:
-        prepare(state, state.quantities, lambda: fields(state, state.quantities, GRID, True))
+        prepare(state, asked, lambda: fields(state, asked, GRID, True))
+    pictures, strength = found[: len(state.quantities)], found[len(state.quantities) :]
     shown = []
     for picture in pictures:
         content = described(picture, difference)
         content["range"] = _fixed(content, ranges)
+        if picture.quantity == "aolp":
+            content["polarised"] = [strength[0].plane, strength[0].mirrored]
         shown.append(content)
     header = {
         "grid": [GRID.zeniths, GRID.azimuths],

@@ -7,7 +7,7 @@ magnitude and the colour says the sign; angles of polarisation have no size, the
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -23,6 +23,8 @@ __all__ = ["DECADES", "SCALES", "draw"]
 SCALES = ("linear", "logarithmic")
 #: Of a logarithmic scale, from the origin to the largest value.
 DECADES = 4.0
+#: Share of the hemisphere above a tenth of the largest value from which on the scale is linear unless one is chosen.
+NARROW = 0.002
 #: Directions at rest and while a slider is dragged; the horizon, where f is 0, is left out.
 REST, DRAGGED = Grid(91, 121), Grid(61, 61)
 #: From where one looks where the state does not say, degrees: azimuth and height, as the figures have it.
@@ -58,7 +60,7 @@ def draw(state: State, workspace: Workspace, dragging: bool) -> tuple[dict[str, 
         "mirrored": halved and picture.sign < 0.0,
         "rim": 0.5 * math.pi * (grid.zeniths - 2) / (grid.zeniths - 1),
         "title": shown["title"],
-        "scale": scale,
+        "scale": scale or _suited(values, most, grid, shown["colours"]),
         "most": most,
         "decades": DECADES,
         "colours": shown["colours"],
@@ -66,7 +68,18 @@ def draw(state: State, workspace: Workspace, dragging: bool) -> tuple[dict[str, 
         "layers": indices,
         "eye": list(EYE),
     }
-    return header, [_field(v / most, shown["colours"], scale).astype("<f2").tobytes() for v in values]
+    return header, [
+        _field(v / most, shown["colours"], header["scale"]).astype("<f2").tobytes() for v in values
+    ]
+
+
+def _suited(values: Sequence[np.ndarray], most: float, grid: Grid, colours: str) -> str:
+    """The scale where none is chosen: linear, a narrow lobe would be a needle in an empty frame."""
+    if colours == "cyclic":
+        return SCALES[0]
+    solid_angle = np.sin(np.linspace(0.0, 0.5 * math.pi, grid.zeniths)[:-1])
+    shares = [solid_angle @ np.mean(np.abs(v) > 0.1 * most, axis=1) / solid_angle.sum() for v in values]
+    return SCALES[0] if max(shares) > NARROW else SCALES[1]
 
 
 def _field(shares: np.ndarray, colours: str, scale: str) -> np.ndarray:
@@ -82,11 +95,11 @@ def _field(shares: np.ndarray, colours: str, scale: str) -> np.ndarray:
     return np.stack([distance, colour, shares, np.ones_like(shares)], axis=-1)
 
 
-def _checked(settings: Mapping[str, Any]) -> tuple[str, str]:
-    quantity, scale = settings.get("quantity", "intensity"), settings.get("scale", SCALES[0])
+def _checked(settings: Mapping[str, Any]) -> tuple[str, str | None]:
+    quantity, scale = settings.get("quantity", "intensity"), settings.get("scale")
     if quantity not in QUANTITIES:
         raise StateError("settings.polar.quantity", f"{quantity!r} is not one of {', '.join(QUANTITIES)}")
-    if scale not in SCALES:
+    if scale is not None and scale not in SCALES:
         raise StateError("settings.polar.scale", f"choose one of {', '.join(SCALES)}")
     for name in ("turn", "tilt"):
         number(settings.get(name, 0.0), f"settings.polar.{name}")

@@ -86,12 +86,6 @@ PANELS.push({
     };
     app.on("answer:data", content => { fault.textContent = ""; build(content); });
     app.on("connected", () => { if (app.state) ask(); });
-    // what has just been opened is shown
-    app.on("answer:opened", ({ datasets }) => {
-      if (!app.state || !datasets?.length) return;
-      asked = null;
-      app.change(state => { state.settings.data = { set: datasets[0] }; }, ONLY_CUTS);
-    });
     // settings of other data, from a state that was sent: they can be given up
     app.on("answer:error", content => {
       if (content.about !== "data") return;

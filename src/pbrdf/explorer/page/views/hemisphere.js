@@ -90,6 +90,7 @@ VIEWS.push({
 
     const value = picture => {
       const x = board.painter.value(picture, ...(pointed ?? kept));
+      if (x === null) return `${picture.title.split(",")[0]} none`;
       return `${picture.title.split(",")[0]} ${written(x)}${picture.colours === "cyclic" ? "°" : picture.logarithmic ? " /sr" : ""}`;
     };
     const read = () => {

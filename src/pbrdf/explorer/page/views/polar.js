@@ -97,7 +97,7 @@ VIEWS.push({
       [name, decoded(text)]));
     let header = null, fields = [], surface = null, net = null, meshed = "", values = null;
 
-    const settings = () => ({ quantity: "intensity", scale: "linear", turn: header?.eye[0] ?? 0,
+    const settings = () => ({ quantity: "intensity", scale: header?.scale ?? "linear", turn: header?.eye[0] ?? 0,
       tilt: header?.eye[1] ?? 0, ...app.state?.settings.polar });
     const set = (values, { dragging = false, views = [] } = {}) => app.change(state => {
       state.settings.polar = { ...state.settings.polar, ...values };

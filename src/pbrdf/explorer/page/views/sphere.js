@@ -195,9 +195,8 @@ VIEWS.push({
             dolp = Math.min(dolp, Math.sqrt(p * p + v * v));
             [q, u] = [q * p + u * v, u * p - q * v];
           }
-          const fade = Math.min(dolp / 0.01, 1), colour = table[(0.5 * Math.atan2(u, q) - low) * scale + 0.5 | 0];
-          const grey = 1 - fade * fade * (3 - 2 * fade);
-          pixels[pixel[k]] = fade < 1 ? towardsGrey(colour, GREY.unpolarised, grey) : colour;
+          const share = shareOfAngle(dolp), colour = table[(0.5 * Math.atan2(u, q) - low) * scale + 0.5 | 0];
+          pixels[pixel[k]] = share < 1 ? towardsGrey(colour, GREY.unpolarised, 1 - share) : colour;
         }
       } else {
         const shown = scalars(fields[0], chosen);
@@ -299,9 +298,9 @@ VIEWS.push({
         const angle = Math.atan2(u, q) / 2 * 180 / Math.PI;
         const name = fields.length > 1 ? `${header.models[i]}: ` : "";
         if (L <= 0) return `${name}in the shadow`;
-        const dolp = written(100 * Math.hypot(q, u)), rounded = Number(angle.toFixed(1));
-        const aolp = written(rounded === -90 ? 90 : rounded);
-        return `${name}${written(L)} sr⁻¹, DoLP ${dolp} %, AoLP ${aolp}°, V/I ${written(100 * v)} %`;
+        const dolp = Math.hypot(q, u), rounded = Number(angle.toFixed(1));
+        const aolp = angleIsNone(dolp) ? "none" : `${written(rounded === -90 ? 90 : rounded)}°`;
+        return `${name}${written(L)} sr⁻¹, DoLP ${written(100 * dolp)} %, AoLP ${aolp}, V/I ${written(100 * v)} %`;
       }).join("; ");
     }
 
