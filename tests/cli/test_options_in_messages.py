@@ -17,8 +17,8 @@ from pbrdf.cli.main import app
 SOURCES = Path(pbrdf.__file__).parent
 #: Not options: names of colours in style sheets.
 NO_OPTIONS = {"report/inline_svg.py"}
-#: Options of other programs: of `dask worker`.
-OTHERS = {"inversion/map_store/scheduler.py": {"--nthreads"}}
+#: Options of other programs: of `dask worker`, of `brew`.
+OTHERS = {"inversion/map_store/scheduler.py": {"--nthreads"}, "backend.py": {"--prefix"}}
 
 
 def options_of_commands() -> dict[str, set[str]]:
@@ -56,9 +56,11 @@ def test_every_option_that_a_text_names_exists():
         place = path.relative_to(SOURCES).as_posix()
         if place in NO_OPTIONS:
             continue
-        known = everywhere
+        known = everywhere | OTHERS.get(place, set())
         if place.startswith("inversion/"):
             known = OPTIONS["fit"] | OPTIONS["compare"] | OTHERS.get(place, set())
+        if place.startswith("inversion/map_store/"):
+            known |= OPTIONS["map"]
         for line, option in named_options(path):
             count += 1
             if option not in known:

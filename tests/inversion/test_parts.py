@@ -191,5 +191,5 @@ def test_a_full_covariance_counts_as_generalised_least_squares():
     assert full.estimates["n"].std != pytest.approx(plain.estimates["n"].std, rel=0.05)
     with pytest.raises(FitError, match=r"it must be \(63, 4, 4\)"):
         pbrdf.fit(dataset, covariance=np.ones((3, 4, 4)))
-    with pytest.raises(FitError, match="geometry 0 is not symmetric and positive definite"):
+    with pytest.raises(FitError, match="covariance at index 0 is not symmetric and positive definite"):
         pbrdf.fit(dataset, covariance=np.ones((63, 4, 4)))
