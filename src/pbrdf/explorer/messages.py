@@ -61,12 +61,18 @@ def unpack(frame: bytes) -> tuple[dict[str, Any], list[memoryview]]:
     return content, buffers
 
 
+def request_number(request: Mapping[str, Any]) -> int | str | None:
+    """The number that a page gave its request; None where it is none that an answer can repeat."""
+    number = request.get("id")
+    return number if isinstance(number, int | str) else None
+
+
 def error_answer(request: Mapping[str, Any], text: str, place: str = "") -> dict[str, Any]:
     """The answer to a request that has none, in words; ``place`` is the path in the state of what is at fault."""
-    about, number = request.get("type"), request.get("id")
+    about = request.get("type")
     return {
         "type": "error",
-        "id": number if isinstance(number, int | str) else None,
+        "id": request_number(request),
         "about": about if isinstance(about, str) else None,
         "place": place,
         "text": text,

@@ -20,7 +20,7 @@ import numpy as np
 
 from pbrdf.errors import PbrdfError
 from pbrdf.explorer.catalogue import catalogue
-from pbrdf.explorer.messages import error_answer
+from pbrdf.explorer.messages import error_answer, request_number
 from pbrdf.explorer.state import StateError, read_state
 from pbrdf.explorer.uploads import MOST_BYTES
 from pbrdf.explorer.workspace import Workspace
@@ -183,7 +183,7 @@ class Session:
 
     def _draw(self, content: dict[str, Any], turn: int) -> None:
         """Draw the views that are asked for; the last answer says so."""
-        number = error_answer(content, "")["id"]
+        number = request_number(content)
         if turn != self._newest_draw:
             self.emit({"type": "superseded", "id": number}, [])
             return

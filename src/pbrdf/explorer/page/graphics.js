@@ -1,7 +1,7 @@
 // WebGL2: fields as float16 textures, colour tables, one program a view. No physics: fields come computed.
 
 class Graphics {
-  constructor(canvas, fragment, vertex = WHOLE_CANVAS) {
+  constructor(canvas, fragment, vertex) {
     this.canvas = canvas;
     const gl = canvas.getContext("webgl2", { antialias: false, preserveDrawingBuffer: true });
     if (!gl) throw new Error("this browser has no WebGL2, which the pictures need");
@@ -60,10 +60,6 @@ class Graphics {
   integer(name, value) { this.gl.uniform1i(this.place(name), value); }
   vector(name, values) { this.gl[`uniform${values.length}fv`](this.place(name), values); }
 }
-
-const WHOLE_CANVAS = `#version 300 es
-out vec2 at;
-void main() { vec2 corner = vec2(gl_VertexID % 2, gl_VertexID / 2); at = 2.0 * corner; gl_Position = vec4(4.0 * corner - 1.0, 0.0, 1.0); }`;
 
 const decoded = text => Uint8Array.from(atob(text), c => c.charCodeAt(0));
 
