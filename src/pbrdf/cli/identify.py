@@ -305,14 +305,8 @@ def _one(request: _Request, source: str, folder: Path | None) -> None:
         following,
         fitted,
     )
-    stood = frozenset() if folder is None else standing(folder)
-    written = [] if folder is None else write_identification(report, folder, figure_format=request.drawn)
-    if request.quiet:
-        print(f"{source}: {', '.join(found.materials) or 'none of these'}")
-        return
-    print_summary(report, output_console())
-    if folder is not None:
-        say_written(folder, written, stood)
+    quiet = f"{source}: {', '.join(found.materials) or 'none of these'}"
+    _hand_over(request, report, folder, write_identification, print_summary, quiet)
 
 
 def _next(source: str, found: Identification) -> NextMeasurement | None:
@@ -379,15 +373,10 @@ def _every_pixel(request: _Request, source: str, pixels: xr.Dataset, folder: Pat
         judged,
         "" if given_labels is None else str(given_labels),
     )
-    stood = frozenset() if folder is None else standing(folder)
-    written = [] if folder is None else write_classes(report, folder, figure_format=request.drawn)
-    if request.quiet:
-        print(folder if folder is not None else f"{source}: {_largest(report)}")
-        return
-    print_classes(report, output_console())
-    if folder is not None:
-        say_written(folder, written, stood)
-    if folder is None:
+    _hand_over(
+        request, report, folder, write_classes, print_classes, folder or f"{source}: {_largest(report)}"
+    )
+    if folder is None and not request.quiet:
         warn(f"{source}: the map of materials is not kept; --output FOLDER writes it")
 
 
@@ -469,12 +458,25 @@ def _judge(request: _Request, table: Path, folder: Path | None) -> None:
     report = LabelledReport(
         found, str(table), request.library, request.name, request.prior, request.settings, command_line()
     )
+    quiet = folder or f"{table}: {confusion_sentence(found, 'measurements')}"
+    _hand_over(request, report, folder, write_labelled, print_labelled, quiet)
+
+
+def _hand_over(
+    request: _Request,
+    report: Any,
+    folder: Path | None,
+    write: Callable[..., list[Path]],
+    show: Callable[..., None],
+    quiet: Path | str,
+) -> None:
+    """Write a report where a folder is given, and show it; `quiet` is all that --quiet prints."""
     stood = frozenset() if folder is None else standing(folder)
-    written = [] if folder is None else write_labelled(report, folder, figure_format=request.drawn)
+    written = [] if folder is None else write(report, folder, figure_format=request.drawn)
     if request.quiet:
-        print(folder if folder is not None else f"{table}: {confusion_sentence(found, 'measurements')}")
+        print(quiet)
         return
-    print_labelled(report, output_console())
+    show(report, output_console())
     if folder is not None:
         say_written(folder, written, stood)
 
