@@ -5,7 +5,6 @@ Signs are told by M/M00, scales by M00: a factor cosθ, π or n, or a division b
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -15,6 +14,7 @@ from numpy.typing import ArrayLike
 from pbrdf.data.convert import PROGRAMS
 from pbrdf.errors import DataError
 from pbrdf.optics.fresnel import mueller_reflection
+from pbrdf.wording import joined
 
 __all__ = ["ConventionComparison", "compare_conventions", "flat_reflection", "named_signs"]
 
@@ -156,8 +156,8 @@ def named_signs(signs: Signs) -> str:
     """The programs that count so, else which of Q, U and V are reversed."""
     programs = [name for name in PROGRAMS if _signs_of(name) == signs]
     reversed_ = [name for name, sign in zip("QUV", signs, strict=True) if sign < 0]
-    words = f"{_listed(reversed_)} reversed" if reversed_ else "nothing reversed"
-    return f"{_listed(programs)} ({words})" if programs else words
+    words = f"{joined(reversed_, 'and')} reversed" if reversed_ else "nothing reversed"
+    return f"{joined(programs, 'and')} ({words})" if programs else words
 
 
 def _signs_of(program: str) -> Signs:
@@ -176,7 +176,3 @@ def _matrices(values: ArrayLike) -> np.ndarray:
             f"Mueller matrices are real numbers of the shape (..., 4, 4); these are {array.dtype} of {array.shape}"
         )
     return array.reshape(-1, 4, 4).astype(np.float64)
-
-
-def _listed(words: Sequence[str]) -> str:
-    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)

@@ -26,6 +26,7 @@ from pbrdf.inversion.refits import Optima
 from pbrdf.inversion.statistics import covariance, prior_spread
 from pbrdf.inversion.verdict import verdict
 from pbrdf.models.parameters import Parameter, shown_unit
+from pbrdf.wording import joined
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -117,7 +118,7 @@ class Identifiability:
         elif not found and len(inside) == 1:
             found = [f"The data determine {inside[0]}, the others being where they are."]
         elif not found and inside:
-            found = [f"The data determine {_listed(inside)}; no combination of these is nearly free."]
+            found = [f"The data determine {joined(inside, 'and')}; no combination of these is nearly free."]
         if self.at_bound:
             found.append(f"Not determined, as the optimum lies on a bound: {', '.join(self.at_bound)}.")
         return found
@@ -261,11 +262,11 @@ def _combination(
         low, high = (parameters[0].shown(end, ".3g") for end in (low, high))
         move = f"moving it anywhere between {low} and {high}"
         cost = float(max(rise[0, lane[0]], rise[1, lane[1]]))
-    joined = _listed(named_as)
+    names = joined(named_as, "and")
     if determined:
-        opening = f"{joined} trade off"
+        opening = f"{names} trade off"
     else:
-        opening = f"The data do not determine {joined}{' apart' if len(columns) > 1 else ''}"
+        opening = f"The data do not determine {names}{' apart' if len(columns) > 1 else ''}"
     limit = "less than 1" if cost < 1.0 else f"{cost:.2g}"
     others = " (the others refitted)" if len(columns) < len(best) else ""
     return Combination(changes, cost, determined, f"{opening}: {move} changes χ² by {limit}{others}.")
@@ -281,12 +282,7 @@ def _move(parameters: list[Parameter], changes: dict[str, float], before: np.nda
             parts.append(f"{name} {'raised' if change > 0.0 else 'lowered'} by {amount} to {end}")
         else:
             parts.append(f"{'raising' if change > 0.0 else 'lowering'} {name} by {amount} to {end}")
-    return parts[0] + (f" with {_listed(parts[1:])}" if parts[1:] else "")
-
-
-def _listed(words: list[str]) -> str:
-    """``x``, ``x and y`` or ``x, y and z``."""
-    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
+    return parts[0] + (f" with {joined(parts[1:], 'and')}" if parts[1:] else "")
 
 
 def _numbers(parameter: Parameter, value: float, change: float) -> tuple[str, str]:

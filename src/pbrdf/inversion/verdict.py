@@ -22,6 +22,7 @@ from pbrdf.inversion.estimates import Estimate
 from pbrdf.inversion.holdout import DARK
 from pbrdf.inversion.optimum import Optimum
 from pbrdf.inversion.statistics import typical
+from pbrdf.wording import joined
 
 __all__ = ["Level", "Stratum", "Verdict", "percent", "quotable", "verdict"]
 
@@ -423,7 +424,9 @@ def _sentence(
         also = ", and the fit explains no more than a constant would" if nothing else ""
         return f"The model does not describe this sample, do not quote its parameters: {overall}{also}."
     why = ("on a bound", "not determined")
-    listed = [f"{_listed(names)} ({reason})" for names, reason in zip(unsure, why, strict=True) if names]
+    listed = [
+        f"{joined(names, 'and')} ({reason})" for names, reason in zip(unsure, why, strict=True) if names
+    ]
     ending = f"; do not quote {' and '.join(listed)}" if listed else ""
     if level == Level.DESCRIBES:
         but = f", but {'; '.join(_where_not(failing))} (grazing)" if failing else ""
@@ -500,8 +503,8 @@ def _reasons(
     edges = [n for n, e in result.estimates.items() if _on_inner_bound(e)]
     if edges:
         yield (
-            f"{_listed(edges)} {'stands' if len(edges) == 1 else 'stand'} on a bound of the search that is none of "
-            "the model: the data ask for something that the model does not have."
+            f"{joined(edges, 'and')} {'stands' if len(edges) == 1 else 'stand'} on a bound of the search that is none "
+            "of the model: the data ask for something that the model does not have."
         )
 
 
@@ -517,10 +520,6 @@ def _on_inner_bound(estimate: Estimate) -> bool:
 def _rms(values: np.ndarray) -> float:
     finite = values[np.isfinite(values)]
     return float(np.sqrt((finite**2).mean())) if finite.size else math.nan
-
-
-def _listed(names: list[str]) -> str:
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
 def percent(share: float) -> str:

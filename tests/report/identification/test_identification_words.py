@@ -12,7 +12,6 @@ from pbrdf.identification.identify import identify
 from pbrdf.identification.library import Library, bundled_library
 from pbrdf.identification.specimen_fits import SpecimenFits
 from pbrdf.report.identification.subject import (
-    joined,
     level_of,
     nearest_rejected,
     p_value_in_words,
@@ -23,6 +22,7 @@ from pbrdf.report.identification.subject import (
     sentence,
 )
 from pbrdf.report.identification.summary import summary_text
+from pbrdf.wording import joined
 
 
 def with_set(report, names):

@@ -8,8 +8,9 @@ from typing import Any
 
 from pbrdf.identification.confusion import Confusion
 from pbrdf.identification.library import Library
-from pbrdf.report.identification.subject import cautions_on, fewest_needed, joined, scatter_sentence
+from pbrdf.report.identification.subject import cautions_on, fewest_needed, scatter_sentence
 from pbrdf.report.numbers import brief
+from pbrdf.wording import joined
 
 __all__ = ["Calibrated", "calibration_rests_on"]
 

@@ -15,13 +15,13 @@ from pbrdf.report.identification.class_figure import ClassCount, class_counts
 from pbrdf.report.identification.subject import (
     calibration_sentence,
     cautions_on,
-    joined,
     library_in_words,
     prior_in_words,
     probability_in_words,
     scatter_sentence,
 )
 from pbrdf.report.numbers import brief, per_cent
+from pbrdf.wording import joined
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,6 +17,7 @@ from pbrdf.identification.specimen_fits import relative_noise
 from pbrdf.report.dataset.describe import short_name
 from pbrdf.report.identification.library_summary import scatter_in_words
 from pbrdf.report.numbers import brief, per_cent
+from pbrdf.wording import joined
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -31,7 +32,6 @@ __all__ = [
     "calibration_sentence",
     "cautions_on",
     "fewest_needed",
-    "joined",
     "level_of",
     "nearest_rejected",
     "p_value_in_words",
@@ -354,8 +354,3 @@ def _other_wavelength(report: Identified) -> list[str]:
         return []
     span = f"{low:g} nm" if high - low < 1e-6 else f"{low:g} … {high:g} nm"
     return [f"{CAUTION}the data are of {span}, other than {joined(others, 'and')}."]
-
-
-def joined(names: Sequence[str], word: str) -> str:
-    """``a, b or c``"""
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} {word} {names[-1]}"
