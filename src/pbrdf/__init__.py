@@ -284,6 +284,7 @@ __all__ = [
 ]
 
 point_drjit_to_llvm()
+provide_presenter("comparison", lambda: importlib.import_module("pbrdf.report.comparison.presenter"))
 provide_presenter("fit", lambda: importlib.import_module("pbrdf.report.fit.presenter"))
 provide_presenter("identification", lambda: importlib.import_module("pbrdf.report.identification.presenter"))
 

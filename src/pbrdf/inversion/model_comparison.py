@@ -9,9 +9,11 @@ with a finite source. As the ranking chooses among many by their held-out error,
 from __future__ import annotations
 
 import math
+import os
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,9 +29,11 @@ from pbrdf.inversion.holdout import HoldOut
 from pbrdf.inversion.ladder import Rung, Step, ladder, with_robust_loss, with_source
 from pbrdf.inversion.result import FitResult
 from pbrdf.models import Model
+from pbrdf.presentation import presenter_of
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.figure import Figure
 
 __all__ = ["Comparison", "Contender", "Failure", "compare_models"]
 
@@ -110,7 +114,7 @@ class Failure:
     reason: str
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Comparison:
     """Result of :func:`compare_models`.
 
@@ -149,6 +153,55 @@ class Comparison:
     polarised: bool
     with_intensity: bool
     resampling: Resampling = field(repr=False)
+
+    def __repr__(self) -> str:
+        return f"<Comparison: {len(self.ranking)} models, {self.best.name} predicts best>"
+
+    def __str__(self) -> str:
+        return self.summary().rstrip()
+
+    def _repr_html_(self) -> str:
+        return str(presenter_of("comparison").html(self))
+
+    def summary(self) -> str:
+        """What ``pbrdf compare`` prints: the verdict, the ranking, what each assumption costs, what failed."""
+        return str(presenter_of("comparison").summary(self))
+
+    def plot(self) -> Figure:
+        """The held-out error of every model with its uncertainty.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            Bound to no window; a notebook shows it, ``savefig`` writes it.
+        """
+        figure: Figure = presenter_of("comparison").figure(self)
+        return figure
+
+    def save(self, folder: str | os.PathLike[str], *, figure_format: str = "png") -> list[Path]:
+        """Write the folder of ``pbrdf compare``.
+
+        Parameters
+        ----------
+        folder
+            Made if it is missing; files of other names in it are left alone.
+        figure_format
+            ``"png"``, ``"pdf"`` or ``"svg"``.
+
+        Returns
+        -------
+        list of Path
+            The files, in the order of their importance to a reader.
+
+        Raises
+        ------
+        DataError
+            If the folder cannot be written.
+        PbrdfError
+            If the format is not one of them.
+        """
+        written: list[Path] = presenter_of("comparison").save(self, Path(folder), figure_format)
+        return written
 
     @property
     def best(self) -> Contender:

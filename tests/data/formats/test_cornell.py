@@ -30,6 +30,12 @@ def test_numbers_follow_one_another_however_the_lines_break(text_file):
     assert ds.attrs["quantity"] == "brdf"
 
 
+def test_the_heading_of_the_first_number_is_no_title(text_file):
+    bare = "# num wls\n" + SMALL.replace("# wavelengths", "").removeprefix("# A paint\n#  with gloss\n")
+    assert read(text_file(bare, "paint.brdf")).attrs.get("title", "") == ""
+    assert read(text_file("# A paint\n" + bare, "other.brdf")).attrs["title"] == "A paint"
+
+
 def test_forward_moves_from_pi_to_zero(text_file):
     """phi_s − phi_i = π is opposite the source, our 0; equal azimuths are backscatter, our π."""
     ds = read(text_file(SMALL, "paint.brdf"), wavelength=600)

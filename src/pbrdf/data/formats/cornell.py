@@ -25,6 +25,9 @@ from pbrdf.files.text import read_lines
 
 __all__ = ["READER", "read_cornell"]
 
+#: What the format's files write above the number of wavelengths.
+_HEADING = "num wls"
+
 
 def read_cornell(path: str | Path, *, wavelength: float | Sequence[float] | None = None) -> xr.Dataset:
     """Read a scalar BRDF from a Cornell ``.brdf`` file.
@@ -100,13 +103,13 @@ def read_cornell(path: str | Path, *, wavelength: float | Sequence[float] | None
 
 
 def _title(text: list[str]) -> str:
-    """The block of comments at the top, as one line."""
+    """The block of comments at the top, as one line, without the format's own heading."""
     sentences = []
     for content in text:
         if not content.startswith("#"):
             break
         sentences.append(content.lstrip("# ").rstrip())
-    return "; ".join(filter(None, sentences))
+    return "; ".join(sentence for sentence in sentences if sentence not in ("", _HEADING))
 
 
 READER = Reader("cornell", read_cornell, extensions=(".brdf",))
