@@ -33,4 +33,5 @@ def two_beam_interference(cos_beta: Any, order: Any, visibility: Any, index: Any
     cos, n = in_double(cos_beta), in_double(index)
     sin2 = dr.maximum(1.0 - cos * cos, 0.0)
     fringe = cos_of_turns(in_double(order) * dr.sqrt(1.0 - sin2 / (n * n)))
-    return (1.0 + visibility * dr.expr_t(cos_beta, order, index)(fringe)) / (1.0 + visibility)
+    Float: Any = dr.expr_t(cos_beta, order, index)
+    return (1.0 + visibility * Float(fringe)) / (1.0 + visibility)

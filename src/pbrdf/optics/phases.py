@@ -17,7 +17,8 @@ __all__ = ["cos_of_turns", "in_double", "less_whole_turns"]
 
 def in_double(x: Any) -> Any:
     """The same number as a float64: an array of them where x is one."""
-    return dr.float64_array_t(type(x))(x)
+    Double: Any = dr.float64_array_t(type(x))
+    return Double(x)
 
 
 def cos_of_turns(turns: Any) -> Any:
