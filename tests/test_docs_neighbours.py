@@ -35,9 +35,8 @@ def test_versions_of_the_page_are_those_of_the_scripts(script):
 def test_versions_of_the_numbers_are_those_of_the_page():
     with (ROOT / "tests" / "data_oracle" / "conventions.csv").open(encoding="utf-8") as file:
         found = {(row["program"], row["version"]) for row in csv.DictReader(file)}
-    assert found and all(
-        f"{program.replace('mitsuba', 'Mitsuba')} {version}" in PAGE for program, version in found
-    )
+    names = {"mitsuba": "Mitsuba", "eradiate-mitsuba": "Eradiate's kernel", "eradiate": "Eradiate"}
+    assert found and all(f"{names.get(program, program)} {version}" in PAGE for program, version in found)
 
 
 def test_conversions_that_the_page_names_are_there():

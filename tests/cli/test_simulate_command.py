@@ -24,6 +24,14 @@ def test_a_grid_reads_back_as_the_model(run, tmp_path):
     assert "SIMULATED" in ds.attrs["source"]
 
 
+def test_an_azimuth_of_many_turns_is_that_of_the_remainder(run):
+    plain, turned = (
+        run("simulate", "white", "--theta-i", "30", "--theta-r", "40", "--phi", phi).stdout
+        for phi in ("10", "3600010")
+    )
+    assert turned == plain
+
+
 def test_the_plane_has_both_sides(run, tmp_path):
     run("simulate", "white", "--plane", "--theta-i", "30", "--theta-r=-60:60:30", "-o", "p.csv")
     ds = pbrdf.read(tmp_path / "p.csv")

@@ -1,7 +1,7 @@
 """What other programs gave (``scripts/make_convention_numbers.py``), converted, is what our formulas say.
 
 Each test states the signs in words. The numbers are those of katsu 0.1.0, polanalyser 3.0.0, pypolar 1.2.0,
-pyElli 0.23.1, pySCATMECH 0.1.10 and Mitsuba 3.9.1 (single precision).
+pyElli 0.23.1, pySCATMECH 0.1.10, Mitsuba 3.9.1 (single precision), Eradiate 1.2.0 and its kernel 0.5.0.
 """
 
 from __future__ import annotations
@@ -17,13 +17,23 @@ from numpy.testing import assert_allclose, assert_array_equal
 import independent as ref
 import pbrdf
 from pbrdf.data import convert
+from pbrdf.data.convention_comparison import compare_conventions
+from pbrdf.data.conventions import azimuth_forward_pi_to_zero
 from pbrdf.errors import DataError
+from pbrdf.models import DoubleGauss
 from pbrdf.optics.elements import diattenuator, retarder
 
 TABLE = Path(__file__).parents[1] / "data_oracle" / "conventions.csv"
-NAMES = {"pySCATMECH": "scatmech", "pyElli": "pyelli"}
+NAMES = {"pySCATMECH": "scatmech", "pyElli": "pyelli", "eradiate-mitsuba": "eradiate"}
 #: Programs with polarisers and retarders, and what to add to their angles, degrees: 90 where their x is s of ours.
-TURN = {"katsu": 0.0, "polanalyser": 0.0, "pypolar": 0.0, "pySCATMECH": 90.0, "mitsuba": 90.0}
+TURN = {
+    "katsu": 0.0,
+    "polanalyser": 0.0,
+    "pypolar": 0.0,
+    "pySCATMECH": 90.0,
+    "mitsuba": 90.0,
+    "eradiate-mitsuba": 0.0,
+}
 FLAT = ("pypolar", "pyElli", "mitsuba")
 CONVERSIONS = sorted(set(convert.PROGRAMS) - {"pyelli"})
 
@@ -35,9 +45,11 @@ def rows(program, what):
     assert found
     known = {
         key: np.array([float(r[key] or "nan") for r in found])
-        for key in ("angle", "retardance", "n", "kappa", "R")
+        for key in ("angle", "retardance", "n", "kappa", "R", "theta_r", "azimuth")
     }
-    matrices = np.array([[[float(r[f"m{i}{j}"]) for j in range(4)] for i in range(4)] for r in found])
+    matrices = np.array(
+        [[[float(r[f"m{i}{j}"] or "nan") for j in range(4)] for i in range(4)] for r in found]
+    )
     return known, matrices
 
 
@@ -95,6 +107,7 @@ SIGNS = {
     "pySCATMECH": (-1, -1, 1),
     "mitsuba": (-1, -1, -1),
     "pyElli": (1, 1, 1),
+    "eradiate-mitsuba": (1, 1, -1),
 }
 
 
@@ -132,11 +145,51 @@ def test_vectors_convert_with_the_matrices(program):
     assert_array_equal(mueller(mueller(M)), M)
 
 
-def test_eradiate_is_mitsuba_turned_from_s_to_p():
-    """Its kernel is Mitsuba's; frames with x = p instead of x = s are a quarter of a turn away."""
-    M = np.random.default_rng(4).normal(size=(3, 4, 4))
-    quarter = np.diag([1.0, -1.0, -1.0, 1.0])
-    assert_allclose(convert.from_eradiate_mueller(quarter @ M @ quarter), convert.from_mitsuba_mueller(M))
+def facets(known):
+    """M/M00 of facets in our convention; Eradiate's azimuths count from the source, ours from the forward direction."""
+    phi = azimuth_forward_pi_to_zero(np.deg2rad(known["azimuth"]))
+    model = DoubleGauss(0.3, known["n"][0] - 1j * known["kappa"][0], 1.0, 1.0, 0.0, 0.0)
+    matrix = model.mueller(np.deg2rad(known["angle"]), np.deg2rad(known["theta_r"]), phi, part="specular")
+    return matrix / matrix[:, :1, :1]
+
+
+def test_facets_of_eradiates_kernel_show_every_sign():
+    """Rough metal off the plane, frames with x in the meridian plane: Q and U as ours, V reversed."""
+    known, theirs = rows("eradiate-mitsuba", "facets")
+    found = compare_conventions(theirs, facets(known), "eradiate")
+    assert found.difference < 1e-12
+    assert [signs for signs, off in found.by_signs.items() if off < 0.1] == [(1, 1, -1)]
+    assert compare_conventions(theirs, facets(known), "mitsuba").better == (1, 1, -1)
+
+
+def test_absorbing_sea_of_eradiate_has_the_other_v():
+    """Its own surfaces take n + iκ for n − iκ: V comes out as ours, against all other plugins of the same kernel."""
+    known, theirs = rows("eradiate-mitsuba", "sea")
+    found = compare_conventions(theirs, facets(known), "eradiate")
+    assert found.difference > 0.1
+    assert found.better == (1, 1, 1)
+    assert found.by_signs[1, 1, 1] < 1e-9
+
+
+@pytest.mark.parametrize(("what", "light"), [("sea natural", 0.0), ("sea circular", -1.0)])
+def test_stokes_vectors_that_eradiate_renders(what, light):
+    """Water without absorption: U off the plane as ours; right circular light, V < 0 here, has V > 0 there."""
+    known, theirs = rows("eradiate", what)
+    ours = facets(known) @ [1.0, 0.0, 0.0, light]
+    stokes = convert.from_eradiate_stokes(theirs[:, :, 0])
+    assert_allclose(stokes / stokes[:, :1], ours / ours[:, :1], atol=1e-7)
+    assert (abs(ours[1:, 2]) > 0.03 * ours[1:, 0]).all()
+    if light:
+        assert (abs(ours[:, 3] / ours[:, 0]) > 0.5).all()
+
+
+def test_reflectance_factor_of_eradiate_is_pi_times_the_brdf():
+    """``radiance`` over ``irradiance``, which has the cosine of the sun, is the BRDF; ``brf`` is π times as much."""
+    known, theirs = rows("eradiate", "matt")
+    assert_allclose(np.pi * theirs[:, 0, 0], 0.3, rtol=1e-7)
+    assert_allclose(known["R"], 0.3, rtol=1e-7)
+    known, theirs = rows("eradiate", "sea natural")
+    assert_allclose(known["R"], np.pi * theirs[:, 0, 0], rtol=1e-7)
 
 
 def test_mueller_of_pyelli_has_m00_divided_out():
@@ -155,9 +208,9 @@ def test_index_of_pyelli_has_the_other_sign():
         convert.from_pyelli_index(1.5 - 0.5j)
 
 
-def test_every_program_has_its_numbers_or_says_so():
-    """The front door leads here; Eradiate alone has no run of its own."""
+def test_every_program_has_its_numbers():
+    """The front door leads here."""
     assert pbrdf.convert is convert
     with TABLE.open(newline="", encoding="utf-8") as file:
         run = {NAMES.get(r["program"], r["program"]) for r in csv.DictReader(file)}
-    assert set(convert.PROGRAMS) - run == {"eradiate"}
+    assert set(convert.PROGRAMS) == run

@@ -112,6 +112,15 @@ def test_polariser_passes_what_is_along_its_axis():
     np.testing.assert_allclose(np.einsum("nij,nj->ni", crossed, light), 0, atol=1e-15)
 
 
+def test_whole_waves_and_whole_turns_do_nothing():
+    """A retarder of a million waves and a quarter is a quarter-wave one; ten turns leave an analyser where it was."""
+    quarter = retarder(0.3, np.pi / 2)
+    for waves, atol in ((1e3, 1e-12), (1e6, 2e-9)):  # what the last digit of the radians leaves
+        np.testing.assert_allclose(retarder(0.3, 2.0 * np.pi * (waves + 0.25)), quarter, atol=atol)
+    np.testing.assert_allclose(diattenuator(np.deg2rad(3630.0)), diattenuator(np.pi / 6), atol=1e-12)
+    np.testing.assert_allclose(retarder(np.deg2rad(-3570.0), 0.7), retarder(np.pi / 6, 0.7), atol=1e-12)
+
+
 def test_a_diattenuation_beyond_one_is_refused():
     for bad in (1.01, -2.0, np.nan):
         with pytest.raises(ModelError, match="diattenuation"):

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import ast
+from pathlib import Path
+
 import drjit as dr
 import numpy as np
 import pytest
@@ -100,3 +103,28 @@ def test_what_does_not_depend_on_anything_is_summed_too():
     total, count = geometric(Float(X), Float(Y))
     assert not dr.grad_enabled(total)
     np.testing.assert_allclose(total.numpy(), Y * count.numpy(), rtol=1e-14)
+
+
+def test_no_loop_states_a_bound_that_could_be_too_small():
+    """With ``max_iterations`` below the true count Dr.Jit's reverse derivative is wrong without a word.
+
+    Without a bound, what is no sum is refused.
+    """
+    loops = []
+    for path in (Path(__file__).parents[2] / "src" / "pbrdf").rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Call) and ast.unparse(node.func).endswith(
+                ("while_loop", "dr.hint", "dr.syntax")
+            ):
+                loops += [ast.unparse(k.value) for k in node.keywords if k.arg == "max_iterations"] or [
+                    "none"
+                ]
+    assert len(loops) > 5 and set(loops) == {"-1", "none"}
+
+    x = Float(X)
+    dr.enable_grad(x)
+    power = dr.while_loop(
+        (UInt32(0), x * 1.0), lambda j, _: j < 4, lambda j, z: (j + 1, z * z), max_iterations=-1
+    )[1]
+    with pytest.raises(RuntimeError, match="max_iterations"):
+        dr.backward(power)

@@ -74,9 +74,15 @@ def _checked(
 ) -> dict[str, np.ndarray]:
     import numpy as np
 
+    from pbrdf.optics.angles import radians_within_a_turn
+
     for name, values in (("--theta-i", theta_i), ("--theta-r", theta_r)):
         bad = values[(values < 0.0) | (values >= 90.0)]
         if bad.size:
             raise PbrdfError(f"{name}: {bad[0]:g}° is not an angle from 0° to below 90°")
-    radians = {"theta_i": theta_i, "theta_r": theta_r, "phi": phi}
-    return {**{name: np.deg2rad(values) for name, values in radians.items()}, "group": group}
+    return {
+        "theta_i": np.deg2rad(theta_i),
+        "theta_r": np.deg2rad(theta_r),
+        "phi": radians_within_a_turn(phi),
+        "group": group,
+    }

@@ -152,7 +152,10 @@ def from_mitsuba_stokes(stokes: ArrayLike) -> NDArray[np.float64]:
 def from_eradiate_mueller(mueller: ArrayLike) -> NDArray[np.float64]:
     """Mueller matrices of Eradiate in meridian planes: Q = I_p − I_s as ours, V > 0 right circular as Mitsuba's.
 
-    Azimuths by :func:`pbrdf.data.conventions.azimuth_forward_pi_to_zero`.
+    Azimuths by :func:`pbrdf.data.conventions.azimuth_forward_pi_to_zero`, ``brf`` is π times our BRDF.
+
+    Not those of its absorbing ``ocean_mishchenko``, ``ocean_grasp`` and ``maignan``, which take n + iκ for n − iκ: M34
+    and its like have our sign there already.
     """
     return mueller_flip_v(mueller)
 

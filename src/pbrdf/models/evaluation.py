@@ -18,6 +18,7 @@ from pbrdf.errors import ModelError
 from pbrdf.models.arrays import Matrix, is_drjit, is_zero, to_numpy, weighted_sum
 from pbrdf.models.parameters import Parameter
 from pbrdf.optics.geometry import Geometry, geometry_from_angles
+from pbrdf.optics.phases import less_whole_turns
 from pbrdf.optics.stokes import STOKES
 
 __all__ = [
@@ -377,8 +378,7 @@ def _evaluate_drjit(
         if content is not None and not content.any() and not dr.grad_enabled(values[p.name]):
             values[p.name] = None
     theta_i, theta_r, phi = (flatten(angles[name]) for name in ("theta_i", "theta_r", "phi"))
-    turns = 2.0 * math.pi * dr.round(phi * (0.5 / math.pi))
-    phi = dr.select(dr.abs(phi) > _MANY_TURNS, dr.clip(phi - turns, -math.pi, math.pi), phi)
+    phi = dr.select(dr.abs(phi) > _MANY_TURNS, less_whole_turns(phi), phi)
     with exact_reciprocals(Float):
         f = kernel_from_angles(model, theta_i, theta_r, phi, values, part)
     # an opaque mask keeps each output a variable of its own: with constant angles it could be an inner node of

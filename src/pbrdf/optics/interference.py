@@ -7,10 +7,11 @@ does to the polarisation are left out.
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import drjit as dr
+
+from pbrdf.optics.phases import cos_of_turns, in_double
 
 __all__ = ["two_beam_interference"]
 
@@ -29,6 +30,8 @@ def two_beam_interference(cos_beta: Any, order: Any, visibility: Any, index: Any
     index
         n_f ≥ 1.
     """
-    sin2 = dr.maximum(1.0 - cos_beta * cos_beta, 0.0)
-    cos_film = dr.sqrt(1.0 - sin2 / (index * index))
-    return (1.0 + visibility * dr.cos(2.0 * math.pi * order * cos_film)) / (1.0 + visibility)
+    cos, n = in_double(cos_beta), in_double(index)
+    sin2 = dr.maximum(1.0 - cos * cos, 0.0)
+    fringe = cos_of_turns(in_double(order) * dr.sqrt(1.0 - sin2 / (n * n)))
+    Float: Any = dr.expr_t(cos_beta, order, index)
+    return (1.0 + visibility * Float(fringe)) / (1.0 + visibility)

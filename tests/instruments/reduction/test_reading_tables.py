@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 
 import pbrdf
 from pbrdf.data.paints import load_paint, open_experiment
@@ -347,6 +347,21 @@ def test_long_tables_in_any_order(table, names):
     again = pbrdf.read(table(long_table(names, shuffled))).sortby("theta_r")
     assert_allclose(stokes_of(again, "IQUV"), STOKES, atol=1e-12)
     assert "polariser of the column" in said(ds) or "ol" not in names.split(",")[0].lower()
+
+
+def test_whole_waves_and_whole_turns_do_nothing(table):
+    """A retarder of a million waves more, and angles of ten turns more, are the same to the last digit."""
+
+    def rows(turns, waves):
+        yield "theta_i,theta_r,phi,analyzer,retarder,retardance_waves,signal"
+        for s, view in zip(STOKES, VIEWS, strict=True):
+            for polarizer, plate in LONG:
+                quarter = "," if plate is None else f"{plate + 360 * turns},{waves}.25"
+                yield f"40,{view},15,{polarizer + 360 * turns},{quarter},{reading(s, polarizer, plate, 90.0)!r}"
+
+    plain, turned = (pbrdf.read(table("\n".join(rows(*more)) + "\n")) for more in ((0, 0), (10, 1_000_000)))
+    assert_allclose(stokes_of(plain, "IQUV"), STOKES, atol=1e-12)
+    assert_array_equal(stokes_of(turned, "IQUV"), stokes_of(plain, "IQUV"))
 
 
 def test_wide_and_long_are_the_same(table):

@@ -40,6 +40,7 @@ from pbrdf.errors import DataError
 from pbrdf.instruments.polarimeter.analyzer_files import read_analyzer
 from pbrdf.instruments.polarimeter.instrument_files import load_instrument
 from pbrdf.instruments.reduction.reading_states import DARK, OPEN, State, parse_state
+from pbrdf.optics.angles import radians_within_a_turn
 from pbrdf.optics.elements import diattenuator, retarder, rotate_frame
 
 __all__ = ["KEYS", "Settings", "is_setting", "settings_of"]
@@ -110,13 +111,13 @@ class Settings:
             # V > 0 is left circular for the receiver.
             left = (state.named == "left") != self.right_is_left
             return self.transmission * np.array([1.0, 0.0, 0.0, 1.0 if left else -1.0])
-        turn = rotate_frame(math.radians(self.zero))
+        turn = rotate_frame(radians_within_a_turn(self.zero))
         if state.vector is not None:
             turned: np.ndarray = np.asarray(state.vector) @ turn
             return turned
         sign = -1.0 if self.clockwise else 1.0
         axis = self.polarizer if state.polarizer is None else state.polarizer
-        row = 2.0 * self.transmission * diattenuator(sign * math.radians(axis))[0]
+        row = 2.0 * self.transmission * diattenuator(sign * radians_within_a_turn(axis))[0]
         if state.retarder is not None:
             retardance = self.retardance if state.retardance is None else state.retardance
             if retardance is None:
@@ -124,7 +125,8 @@ class Settings:
                     "the retardance of the retarder is not stated; add a line '# analyzer_retardance: 90' or the "
                     "option analyzer retardance"
                 )
-            row = row @ retarder(sign * math.radians(state.retarder), math.radians(retardance))
+            fast = sign * radians_within_a_turn(state.retarder)
+            row = row @ retarder(fast, radians_within_a_turn(retardance))
         analyzer: np.ndarray = row @ turn
         return analyzer
 
