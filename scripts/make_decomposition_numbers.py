@@ -3,7 +3,8 @@
 Only matrices that katsu decomposes rightly: with diattenuation below 1 and with a positive determinant. Each is
 transmittance · depolariser · two retarders · diattenuator, so that the retarder is elliptic.
 
-Run from the repository's root in an environment that holds katsu 0.1.0: ``python scripts/make_decomposition_numbers.py``.
+Run from the repository's root in an environment that holds katsu 0.1.0:
+``python scripts/make_decomposition_numbers.py``.
 """
 
 from __future__ import annotations

@@ -126,7 +126,7 @@ def test_signs_in_words():
 
 
 def test_half_wave_retarders():
-    """Both axes lead alike: that with positive Q is given, at Q = 0 that with positive U, and noise does not turn it."""
+    """Both axes lead alike: that with positive Q is given, at Q = 0 that with positive U; noise does not turn it."""
     angles = np.array([-1.2, -0.9, 0.0, 0.3, np.pi / 4, 3 * np.pi / 4, np.pi / 2])
     found = lu_chipman(retarder(angles, np.pi))
     assert_allclose(found.retardance, np.pi, rtol=1e-15)
@@ -173,7 +173,7 @@ def test_noise_of_rounding_does_not_jump():
 
 
 def test_polarisers():
-    """Diattenuation 1; what acts on the state that they pass is not to be told from one matrix. Other quantities are."""
+    """Diattenuation 1; what acts on the state that they pass is not to be told from one matrix, the rest is."""
     for matrix, polarizance in (
         (diattenuator([0.0, 0.3, -1.0]), 1.0),
         (0.2 * retarder(0.4, 1.0) @ diattenuator([0.0, 0.3, -1.0]), 1.0),
@@ -332,8 +332,8 @@ def test_xarray():
 
 
 def test_depolarisation_index_and_entropy():
-    """1 and 0 without depolarisation, 0 and 1 for the ideal depolariser; a mixture of two equal orthogonal ones has half
-    the entropy; noise, which makes eigenvalues negative, does no harm."""
+    """1 and 0 without depolarisation, 0 and 1 for the ideal depolariser; a mixture of two equal orthogonal ones has
+    half the entropy; noise, which makes eigenvalues negative, does no harm."""
     for pure in (np.eye(4), retarder(0.3, 1.0), diattenuator(0.1), 0.2 * diattenuator(0.1, 0.4)):
         assert pbrdf.depolarization_index(pure) == pytest.approx(1.0)
         assert pbrdf.cloude_entropy(pure) == pytest.approx(0.0, abs=1e-13)

@@ -37,8 +37,8 @@ class LuChipman:
     diattenuation, polarizance
         Lengths of the vectors below, shape (...).
     diattenuation_vector, polarizance_vector
-        First row and first column over M00, shape (..., 3): the state that is transmitted best points along the first, and
-        natural light leaves with the second.
+        First row and first column over M00, shape (..., 3): the state that passes best points along the first, natural
+        light leaves with the second.
     retardance
         Of M_R, radians within [0, π], shape (...).
     fast_axis
@@ -64,11 +64,11 @@ class LuChipman:
 def lu_chipman(mueller: Any) -> LuChipman:
     """Decompose Mueller matrices as Lu and Chipman do.
 
-    NaN stands where a matrix says nothing: everything where M00 is not above 0 or an element is not finite; retarder and
-    depolariser of a perfect polariser (D = 1, or above by noise), which lets one state through; the retarder of what
-    leaves less than two directions of the Poincaré sphere polarised, as the ideal depolariser. Where the determinant of
-    M is below 0, m_Δ is negative in all directions, as in the paper: noise that turns the sign of a determinant near 0
-    turns the retardance with it.
+    NaN stands where a matrix says nothing: everything where M00 is not above 0 or an element is not finite; retarder
+    and depolariser of a perfect polariser (D = 1, or above by noise), which lets one state through; the retarder of
+    what leaves less than two directions of the Poincaré sphere polarised, as the ideal depolariser. Where the
+    determinant of M is below 0, m_Δ is negative in all directions, as in the paper: noise that turns the sign of a
+    determinant near 0 turns the retardance with it.
 
     Parameters
     ----------
