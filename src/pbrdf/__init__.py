@@ -84,7 +84,8 @@ if TYPE_CHECKING:
         register,
     )
     from pbrdf.models.reflectance import directional_hemispherical_reflectance
-    from pbrdf.optics.mueller import coherency_eigenvalues
+    from pbrdf.optics.decomposition import lu_chipman
+    from pbrdf.optics.mueller import cloude_entropy, coherency_eigenvalues, depolarization_index
     from pbrdf.optics.stokes import aolp, docp, dolp, dop, ellipticity
     from pbrdf.planning.plan import plan
     from pbrdf.rendering.bsdf import register as register_bsdf
@@ -112,6 +113,9 @@ _HOME = {
     "aolp": "pbrdf.optics.stokes",
     "ellipticity": "pbrdf.optics.stokes",
     "coherency_eigenvalues": "pbrdf.optics.mueller",
+    "cloude_entropy": "pbrdf.optics.mueller",
+    "depolarization_index": "pbrdf.optics.mueller",
+    "lu_chipman": "pbrdf.optics.decomposition",
     # data sets
     "read": "pbrdf.data",
     "write": "pbrdf.data",
@@ -223,11 +227,13 @@ __all__ = [
     "calibrate_instrument",
     "calibrate_library",
     "check",
+    "cloude_entropy",
     "coherency_eigenvalues",
     "compare",
     "contour",
     "convert",
     "cross_validate",
+    "depolarization_index",
     "directional_hemispherical_reflectance",
     "division_of_focal_plane",
     "docp",
@@ -248,6 +254,7 @@ __all__ = [
     "load_instrument",
     "load_model",
     "load_paint",
+    "lu_chipman",
     "make_dataset",
     "map_dataset",
     "material_from_fits",

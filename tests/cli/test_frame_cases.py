@@ -191,11 +191,20 @@ def test_readings_of_a_dual_rotating_retarder(run, tmp_path, instrument):
         M, std = ds["mueller"].values[k], ds["mueller_std"].values[k]
         assert (np.abs(M - scale * SAMPLE) < 4.5 * std).all()
         assert (std < 1.5).all()
+    # r_p/r_s of ψ and Δ: diattenuation |cos 2ψ|, retardance |Δ|
+    retardance = np.rad2deg(np.arctan2(0.35, -0.9))
+    for row in rows(tmp_path / "r" / "summary.csv"):
+        for name, exact in (("diattenuation", 0.2), ("polarizance", 0.2), ("retardance_deg", retardance)):
+            assert abs(float(row[name]) - exact) < 4.5 * float(row[f"{name}_std"])
+        assert float(row["retardance_deg_std"]) < 0.1
+    assert "retardance 158.7" in done.stdout and "fast axis" in done.stdout
+    assert (tmp_path / "r" / "properties.png").exists()
     # a wrong retardance makes a matrix that no sample has, and fits; a wrong order of readings does not fit
     done = run(
         "reduce", str(tmp_path / "readings.csv"), "-p", instrument(DRR.replace("92", "110")), "-o",
-        str(tmp_path / "w"),
+        str(tmp_path / "w"), "--no-pictures",
     )  # fmt: skip
+    assert not (tmp_path / "w" / "properties.png").exists()
     assert "no sample has this Mueller matrix" in done.stderr
     assert "order of the states" not in done.stderr
     rolled = [f"a,{value:.3f}" for value in np.roll(readings, 1)]

@@ -75,7 +75,10 @@ def reduce(
     ] = "nc",
     datasets: Annotated[str, typer.Option(help="Format of the data sets.", metavar="csv|nc")] = "csv",
     pictures: Annotated[
-        bool, typer.Option("--pictures/--no-pictures", help="Draw S0, DoLP and AoLP.")
+        bool,
+        typer.Option(
+            "--pictures/--no-pictures", help="Draw S0, DoLP and AoLP, or what Mueller matrices say."
+        ),
     ] = True,
     weighted: Annotated[
         bool,
@@ -145,6 +148,7 @@ def reduce(
             series=series,
             datasets=datasets,
             memory=memory,
+            pictures=pictures,
             quiet=quiet,
         )
         return
@@ -216,6 +220,7 @@ def _reduce_mueller(
     series: str | None,
     datasets: str,
     memory: int,
+    pictures: bool,
     quiet: bool,
 ) -> None:
     """Mueller matrices from frames or from a table of readings."""
@@ -254,7 +259,13 @@ def _reduce_mueller(
         notes = notes_of(opened)
     folder, stood = _folder(frames, output)
     files = write_mueller(
-        found, instrument, folder, angles=table, suffix=f".{datasets}", name=frames.resolve().name
+        found,
+        instrument,
+        folder,
+        angles=table,
+        suffix=f".{datasets}",
+        name=frames.resolve().name,
+        pictures=pictures,
     )
     for note in [*mueller_warnings(found), *notes]:
         warn(note)

@@ -1,15 +1,22 @@
-"""Physical realisability of Mueller matrices: Cloude's coherency matrix.
+"""What a Mueller matrix says undecomposed: Cloude's coherency matrix and its entropy, the depolarisation index.
 
-Source: Cloude, Optik 75, 26 (1986): H = ¼ Σ_ij M_ij (σ_i ⊗ σ_j*) with the Pauli matrices in the order of the
-Stokes parameters; M is a passive mixture of Jones matrices exactly if H has no negative eigenvalue.
+Sources: Cloude, Optik 75, 26 (1986): H = ¼ Σ_ij M_ij (σ_i ⊗ σ_j*) with the Pauli matrices in the order of the
+Stokes parameters; M is a passive mixture of Jones matrices exactly if H has no negative eigenvalue. Cloude and Pottier,
+Opt. Eng. 34, 1599 (1995): the entropy. Gil and Bernabeu, Opt. Acta 33, 185 (1986): the depolarisation index. None of
+them needs a decomposition or depends on the sign of V.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike
 
-__all__ = ["coherency_eigenvalues"]
+from pbrdf.errors import DataError
+
+__all__ = ["cloude_entropy", "coherency_eigenvalues", "depolarization_index", "matrices_of", "normalized"]
 
 _PAULI = np.array(
     [
@@ -19,6 +26,8 @@ _PAULI = np.array(
         [[0, -1j], [1j, 0]],
     ]
 )
+#: An element of so many times M00 is no measurement, and overflows in products.
+_BEYOND = 1e30
 _BASIS = 0.25 * np.einsum("iab,jcd->ijacbd", _PAULI, _PAULI.conj()).reshape(4, 4, 4, 4)
 
 
@@ -37,3 +46,102 @@ def coherency_eigenvalues(mueller: ArrayLike) -> np.ndarray:
     """
     H = np.einsum("...ij,ijab->...ab", np.asarray(mueller, dtype=float), _BASIS)
     return np.linalg.eigvalsh(H)
+
+
+def depolarization_index(mueller: Any) -> Any:
+    """Depolarisation index of Gil and Bernabeu, √((Σ M_ij² − M00²)/3)/M00.
+
+    Parameters
+    ----------
+    mueller
+        Mueller matrices, shape (..., 4, 4), normalised or not; or an xarray array with the dimensions ``stokes_out``
+        and ``stokes_in``.
+
+    Returns
+    -------
+    ndarray or xarray.DataArray
+        Of the leading dimensions: 1 for a matrix that depolarises nothing, 0 for the ideal depolariser; NaN where M00
+        is not above 0 or an element is not finite.
+
+    Raises
+    ------
+    DataError
+        If these are not 4 × 4 matrices.
+    """
+    matrices, scalar = matrices_of(mueller)
+    M, known = normalized(matrices)
+    squares = np.square(M).sum(axis=(-2, -1)) - 1.0
+    return scalar(np.where(known, np.sqrt(squares / 3.0), np.nan))
+
+
+def cloude_entropy(mueller: Any) -> Any:
+    """Entropy of the eigenvalues of Cloude's coherency matrix, −Σ p_i log₄ p_i with p_i = λ_i/Σλ.
+
+    Parameters
+    ----------
+    mueller
+        As for :func:`depolarization_index`.
+
+    Returns
+    -------
+    ndarray or xarray.DataArray
+        Of the leading dimensions: 0 for one Jones matrix, 1 for the ideal depolariser, NaN as for
+        :func:`depolarization_index`. Negative eigenvalues, which noise gives, count as 0.
+
+    Raises
+    ------
+    DataError
+        If these are not 4 × 4 matrices.
+    """
+    matrices, scalar = matrices_of(mueller)
+    M, known = normalized(matrices)
+    shares = np.maximum(coherency_eigenvalues(M), 0.0)
+    shares /= shares.sum(axis=-1, keepdims=True)
+    logarithms = np.log2(np.where(shares > 0.0, shares, 1.0))
+    # + 0.0: no -0.0
+    return scalar(np.where(known, -0.5 * (shares * logarithms).sum(axis=-1) + 0.0, np.nan))
+
+
+def matrices_of(mueller: Any) -> tuple[np.ndarray, Callable[..., Any]]:
+    """Mueller matrices as a NumPy array (..., 4, 4), and what makes results the kind that was given.
+
+    The callable takes an array of the leading dimensions and the names of dimensions that follow these: none,
+    ``stokes_out`` and ``stokes_in``, or ``stokes`` for the three numbers Q, U, V of a direction on the Poincaré sphere.
+
+    Raises
+    ------
+    DataError
+        If these are not 4 × 4 matrices, or an xarray array has not the dimensions of a Mueller matrix.
+    """
+    dims = getattr(mueller, "dims", None)
+    if dims is None:
+        matrices = np.asarray(mueller, dtype=float)
+        if matrices.shape[-2:] != (4, 4):
+            raise DataError(f"Mueller matrices have the shape (..., 4, 4), these have {matrices.shape}")
+        return matrices, lambda values, *_: values[()]
+    import xarray as xr
+
+    own = ("stokes_out", "stokes_in")
+    if not {*own} <= {*dims} or mueller.sizes["stokes_out"] != 4 or mueller.sizes["stokes_in"] != 4:
+        raise DataError(
+            f"Mueller matrices have the dimensions {' and '.join(own)} of the length 4, these have "
+            f"{dict(mueller.sizes)}"
+        )
+    labelled = mueller.transpose(..., *own)
+    leading = labelled.isel(dict.fromkeys(own, 0), drop=True)
+
+    def made(values: np.ndarray, *following: str) -> xr.DataArray:
+        coords = labelled.coords if following == own else leading.coords
+        if following == ("stokes",):
+            coords = {**coords, "stokes": list("QUV")}
+        return xr.DataArray(values, dims=(*leading.dims, *following), coords=coords)
+
+    return np.asarray(labelled.values, dtype=float), made
+
+
+def normalized(matrices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """M/M00, and where that is known: M00 > 0 and all elements finite. The unit matrix stands where it is not."""
+    largest = np.abs(matrices).max(axis=(-2, -1))
+    known = np.isfinite(largest) & (largest / _BEYOND < matrices[..., 0, 0])
+    safe = np.where(known[..., None, None], matrices, np.eye(4))
+    return safe / safe[..., :1, :1], known

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,9 +14,13 @@ from pbrdf.files.atomic import atomic_folder
 from pbrdf.files.delimited import write_table
 from pbrdf.instruments.goniometer.angle_table import AngleTable
 from pbrdf.instruments.polarimeter.instrument import Instrument
+from pbrdf.instruments.reduction.mueller_properties import UNKNOWN_RETARDANCE, Properties, mueller_properties
 from pbrdf.instruments.reduction.mueller_reduction import MuellerMeans, mueller_dataset
 from pbrdf.optics.mueller import coherency_eigenvalues
+from pbrdf.report.numbers import with_error
 from pbrdf.report.reduction.gallery import safe_name
+from pbrdf.report.reduction.mueller_figure import properties_figure
+from pbrdf.report.style import save_figure
 from pbrdf.version import __version__
 
 if TYPE_CHECKING:
@@ -28,6 +33,14 @@ __all__ = ["mueller_warnings", "print_mueller", "write_mueller"]
 _CONTRADICTION, _NOISES, _SMALL = 0.02, 2.0, 0.002
 #: Negative eigenvalues of the coherency matrix up to this share of m00 are nobody's concern.
 _UNPHYSICAL = 0.02
+#: What is printed of a matrix, in words and with its unit.
+_QUANTITIES = (
+    ("diattenuation", "diattenuation", ""),
+    ("polarizance", "polarizance", ""),
+    ("depolarization", "depolarisation", ""),
+    ("retardance_deg", "retardance", "°"),
+    ("fast_axis_deg", "fast axis", "°"),
+)
 #: More matrices than this are not printed.
 _MOST = 6
 
@@ -40,8 +53,9 @@ def write_mueller(
     angles: AngleTable | None,
     suffix: str,
     name: str,
+    pictures: bool = True,
 ) -> list[Path]:
-    """Write ``summary.csv``, and with angles a data set for each region; returns the files.
+    """Write ``summary.csv``, of several series ``properties.png``, and with angles a data set for each region.
 
     Parameters
     ----------
@@ -57,6 +71,13 @@ def write_mueller(
         Extension of the data sets.
     name
         What to call the readings.
+    pictures
+        Whether to draw the figure.
+
+    Returns
+    -------
+    list
+        The files.
 
     Raises
     ------
@@ -67,12 +88,14 @@ def write_mueller(
     with atomic_folder(directory, fill=True) as temporary:
         elements = [f"m{i}{j}" for i in range(4) for j in range(4)]
         header = ["series", "region", "good", "saturated", "dead", *elements, *(f"{e}_std" for e in elements)]
+        properties = {region: mueller_properties(means) for region, means in found.items()}
+        quantities = [f"{q}{end}" for q in next(iter(properties.values())) for end in ("", "_std")]
         rows = [
-            [series, region, *means.counts[k].values(), *map(repr, _numbers(means, k))]
+            [series, region, *means.counts[k].values(), *map(repr, _numbers(means, properties[region], k))]
             for region, means in found.items()
             for k, series in enumerate(means.names)
         ]
-        write_table(temporary / names[0], [*header, "residual"], rows)
+        write_table(temporary / names[0], [*header, "residual", *quantities], rows)
         if angles is not None:
             for region, means in found.items():
                 attrs = {
@@ -81,15 +104,19 @@ def write_mueller(
                 }
                 names.append(f"{safe_name(region)}{suffix}")
                 write(mueller_dataset(means, instrument, angles, attrs=attrs), temporary / names[-1])
+        if pictures and any(len(means.names) > 1 for means in found.values()):
+            names.insert(1, "properties.png")
+            save_figure(properties_figure(found, properties, angles, name), temporary / names[1])
     return [directory / file for file in names]
 
 
-def _numbers(means: MuellerMeans, series: int) -> list[float]:
-    """Elements, their standard uncertainties, and the residual."""
+def _numbers(means: MuellerMeans, properties: Properties, series: int) -> list[float]:
+    """Elements, their standard uncertainties, the residual, and what the matrix says with errors."""
     return [
         *means.mueller[series].ravel().tolist(),
         *means.std[series].ravel().tolist(),
         float(means.residual[series]),
+        *(float(values[series]) for pair in properties.values() for values in pair),
     ]
 
 
@@ -131,9 +158,10 @@ def _unphysical(region: str, means: MuellerMeans) -> list[str]:
 
 
 def print_mueller(found: Mapping[str, MuellerMeans], console: Console) -> None:
-    """Print intensities and normalised matrices with the standard errors of their elements."""
+    """Print intensities, normalised matrices and what they say, with standard errors."""
     shown = 0
     for region, means in found.items():
+        properties = mueller_properties(means)
         for k, series in enumerate(means.names):
             if shown == _MOST:
                 console.print("… more in summary.csv")
@@ -149,3 +177,20 @@ def print_mueller(found: Mapping[str, MuellerMeans], console: Console) -> None:
             for row, error in zip(ratios, errors, strict=True):
                 cells = (f"{m: .4f} ± {e:.4f}" for m, e in zip(row, error, strict=True))
                 console.print("  " + "   ".join(cells), markup=False)
+            for line in _said(properties, k):
+                console.print(f"  {line}", markup=False)
+
+
+def _said(properties: Properties, series: int) -> list[str]:
+    """What the matrix of a series says, in words; nothing of angles that it leaves open."""
+    numbers = {name: (float(value[series]), float(std[series])) for name, (value, std) in properties.items()}
+    words = {
+        name: f"{words} {with_error(*numbers[name])}{unit}"
+        for name, words, unit in _QUANTITIES
+        if math.isfinite(numbers[name][0]) and not (unit and numbers[name][1] > UNKNOWN_RETARDANCE)
+    }
+    if "retardance_deg" not in words:
+        words["retardance_deg"] = "no retardance to be told"
+        words.pop("fast_axis_deg", None)
+    kept = [words[name] for name, *_ in _QUANTITIES if name in words]
+    return [", ".join(kept[:2]), ", ".join(kept[2:])] if len(words) > 1 else []
