@@ -68,8 +68,8 @@ class PbsdfExport:
     def bsdf(self) -> dict[str, Any]:
         """The BSDF for ``mitsuba.load_dict``; it needs neither this package nor its plugin.
 
-        Where light and view have exactly one direction, the plugin itself has no number, whatever the table holds: put a
-        lamp beside the camera and not at it, by a ten-thousandth of the distance or more.
+        Where light and view have exactly one direction, the plugin itself has no number, whatever the table holds: put
+        a lamp beside the camera and not at it, by a ten-thousandth of the distance or more.
 
         ``wavelength`` is there if the file has just one: monochromatic variants insist on it, spectral ones then use
         that one at every wavelength.

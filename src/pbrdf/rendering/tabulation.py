@@ -170,7 +170,7 @@ def refined_table(
     Raises
     ------
     ModelError
-        If a model is not finite somewhere, or reflects less than nothing; see :func:`pbrdf.rendering.storable.storable`.
+        If a model is not finite somewhere, or below 0; see :func:`pbrdf.rendering.storable.storable`.
     """
     samples = [random_directions(float(model.lobe_width()), points) for model in models]
     needs = [_needs(models, axis) for axis in range(3)]

@@ -133,8 +133,8 @@ def write_planes(planes: ArrayLike, path: str | Path) -> None:
     if wrong.any():
         colour, *cell = np.argwhere(wrong)[0].tolist()
         raise DataError(
-            f"{path}: {COLOURS[colour]} is {values[(colour, *cell)]:.4g} in the cell {tuple(cell)}: the format holds finite "
-            "values from 0, and takes others for none"
+            f"{path}: {COLOURS[colour]} is {values[(colour, *cell)]:.4g} in the cell {tuple(cell)}: the format holds "
+            "finite values from 0, and takes others for none"
         )
     raw = values / _SCALES[:, np.newaxis, np.newaxis, np.newaxis]
     with atomic_file(path) as beside, beside.open("wb") as file:
