@@ -15,6 +15,7 @@ from export_helpers import evaluated, plain_mitsuba, share_of_f00
 from numpy.testing import assert_allclose, assert_array_equal
 
 import pbrdf
+from every_model import EVERY, example
 from pbrdf.data.formats.merl import read_planes
 from pbrdf.data.formats.pbsdf import read_table, write_table
 from pbrdf.data.formats.tensor_file import read_tensors, write_tensors
@@ -115,6 +116,17 @@ def test_every_geometry_has_a_number_and_an_intensity(exported):
             assert (np.abs(found).max((1, 2)) <= 1.001 * found[:, 0, 0]).all()
 
 
+@EVERY
+def test_no_model_within_its_bounds_is_below_0_or_without_a_number(cls, tmp_path, monkeypatch):
+    """None is refused, none has a cell that rounding takes below 0."""
+    monkeypatch.setattr("pbrdf.rendering.tabulation.LARGEST_TABLE", 5_000)
+    for seed in (3, 4):
+        written = write_pbsdf(example(cls, seed), tmp_path / "any.pbsdf")
+        assert written.below == 0
+        assert np.isfinite(written.table.matrices).all()
+        assert (written.table.matrices[..., 0, 0] >= 0.0).all()
+
+
 def test_light_and_view_beside_each_other_are_the_models_retro_reflection(exported):
     """A ten-thousandth of a radian apart; the plugin itself has no number at exactly one direction."""
     models, written = exported
@@ -144,6 +156,42 @@ def test_our_plugin_has_the_retro_reflection_itself():
     for models in FAMILIES.values():
         found = evaluated(mi, mi.load_dict(bsdf_dict(models[0])), *away, azimuth_i=0.0)
         assert share_of_f00(found, models[0].mueller(*away)).max() < 1e-3
+
+
+def test_a_sphere_lit_from_beside_the_camera_is_that_of_our_plugin(tmp_path):
+    """Lamp aside by a ten-thousandth of its distance of 2: no pixel is NaN, as one in six is with it at the camera."""
+    from pbrdf.rendering import bsdf_dict, register
+
+    written = write_pbsdf(METAL, tmp_path / "metal.pbsdf", wavelengths=550)
+    mi = plain_mitsuba()
+    register()
+
+    def stokes(bsdf):
+        film = {"type": "hdrfilm", "width": 64, "height": 64, "rfilter": {"type": "box"}}
+        direct = {"type": "direct", "bsdf_samples": 0, "emitter_samples": 1}
+        scene = {
+            "type": "scene",
+            "integrator": {"type": "stokes", "nested": direct},
+            "sphere": {"type": "sphere", "bsdf": bsdf},
+            "lamp": {"type": "point", "position": [2e-4, 0.3, 3.0], "intensity": 10.0},
+            "camera": {
+                "type": "perspective",
+                "fov": 45,
+                "to_world": mi.ScalarTransform4f().look_at([0, 0.3, 3], [0, 0, 0], [0, 1, 0]),
+                "film": {**film, "component_format": "float32"},
+                "sampler": {"type": "independent", "sample_count": 4},
+            },
+        }
+        # S0 … S3 in three equal channels each, behind the radiance
+        return np.array(mi.render(mi.load_dict(scene), seed=1))[..., 1::3]
+
+    found, ours = stokes(written.bsdf), stokes(bsdf_dict(METAL))
+    assert np.isfinite(found).all()
+    hit = ours[..., 0] > 0
+    assert 0.3 < hit.mean() < 0.8
+    off = np.abs(found - ours)[hit].max(-1) / ours[hit][:, 0]
+    assert np.median(off) < 0.002
+    assert np.quantile(off, 0.95) < 0.01
 
 
 class Steep(Model):

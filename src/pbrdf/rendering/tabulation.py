@@ -285,7 +285,9 @@ def _table(
         matrices[2 * middle - index] = matrices[index] * _MIRROR
         if progress is not None:
             progress(index - middle + 1, len(phi_d) - middle)
-    return PolarizedTable(*axes, np.asarray(wavelengths, dtype=np.uint16), matrices), below
+    return PolarizedTable(
+        axes[0], axes[1], axes[2], np.asarray(wavelengths, dtype=np.uint16), matrices
+    ), below
 
 
 def _errors(
