@@ -1,8 +1,10 @@
+import drjit as dr
 import numpy as np
 import pytest
 
 import pbrdf
 from pbrdf.data.formats.pbsdf import read_table
+from pbrdf.models import MODELS, Model, Parameter
 
 
 @pytest.fixture
@@ -17,7 +19,7 @@ def models(tmp_path):
 @pytest.mark.slow
 def test_a_table_for_mitsuba_tells_its_error_and_how_to_load_it(run, tmp_path, models):
     result = run(
-        "export", "blue.json", "red.json", "--wavelength", 450, "--wavelength", 650, "-o", "paint.pbsdf"
+        "export", "red.json", "blue.json", "--wavelength", 650, "--wavelength", 450, "-o", "paint.pbsdf"
     )
     lines = result.stdout.splitlines()
     assert lines[0].startswith("paint.pbsdf: ")
@@ -43,6 +45,30 @@ def test_the_format_names_the_file_and_a_missing_wavelength_is_told(run, tmp_pat
     result = run("export", "blue.json", "--format", "pbsdf")
     assert "550 nm is written; state it with --wavelength" in result.stderr
     assert read_table(tmp_path / "blue.pbsdf").wavelength == [550]
+
+
+class Edge(Model):
+    """1/sr on facets within 30° of the normal, and a little below 0 beyond."""
+
+    name = "edge-for-export"
+    parameters = (Parameter("dark", "d", "1", "f00 of steep facets", -1.0, 1.0, (-10.0, 10.0), 0.0),)
+
+    def kernel(self, geometry, values, part="total"):
+        f = [[0.0] * 4 for _ in range(4)]
+        f[0][0] = dr.select(geometry.facet[2] > 0.87, 1.0, values["dark"])
+        return f
+
+
+@pytest.mark.slow
+def test_a_model_below_0_by_rounding_is_told_and_further_below_refused(run, refused, tmp_path, monkeypatch):
+    monkeypatch.setitem(MODELS._classes, Edge.name, Edge)
+    monkeypatch.setattr("pbrdf.rendering.tabulation.LARGEST_TABLE", 5_000)
+    Edge(dark=-1e-9).to_json(tmp_path / "edge.json")
+    assert "cells are 0: the model is below 0 there" in run("export", "edge.json", "--wavelength", 550).stderr
+    assert (read_table(tmp_path / "edge.pbsdf").matrices[..., 0, 0] >= 0.0).all()
+    Edge(dark=-0.5).to_json(tmp_path / "deep.json")
+    assert "is -0.5 1/sr, which is no intensity" in refused("export", "deep.json", "--wavelength", 550)
+    assert not (tmp_path / "deep.pbsdf").exists()
 
 
 @pytest.mark.parametrize(("format", "name"), [("netcdf", "white.nc"), ("csv", "white.csv")])

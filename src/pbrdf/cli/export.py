@@ -165,6 +165,11 @@ def _tell(written: PbsdfExport, stated: bool) -> None:
             f"{written.path}: this misses the aim of {100 * AIMS[0]:.2f} % and {100 * AIMS[1]:.2f} %: the model is "
             "too steep for a table of a bearable size"
         )
+    if written.below:
+        warn(
+            f"{written.path}: {written.below} cells are 0: the model is below 0 there, by less than a millionth of its "
+            "mirror peak"
+        )
     if not stated:
         warn(
             f"{written.path}: no wavelength is known: {table.wavelength[0]} nm is written; state it with --wavelength"

@@ -18,6 +18,7 @@ from pbrdf.data.formats.pbsdf import MOST_WAVELENGTHS, SIMULATED, PolarizedTable
 from pbrdf.errors import DataError, ModelError
 from pbrdf.models import Model
 from pbrdf.optics.half_difference import directions
+from pbrdf.rendering.storable import require_finite, storable
 from pbrdf.rendering.tabulation import TableError, refined_table
 from pbrdf.version import __version__
 
@@ -52,6 +53,8 @@ class PbsdfExport:
         Whether they are as small as was asked for.
     alpha_sample
         Roughness by which the plugin shall sample directions: √2 σ of the narrowest lobe.
+    below
+        Number of cells that are 0 because the model is below 0 there, by rounding.
     """
 
     path: Path
@@ -59,10 +62,14 @@ class PbsdfExport:
     errors: list[TableError]
     accurate: bool
     alpha_sample: float
+    below: int
 
     @property
     def bsdf(self) -> dict[str, Any]:
         """The BSDF for ``mitsuba.load_dict``; it needs neither this package nor its plugin.
+
+        Where light and view have exactly one direction, the plugin itself has no number, whatever the table holds: put
+        a lamp beside the camera and not at it, by a ten-thousandth of the distance or more.
 
         ``wavelength`` is there if the file has just one: monochromatic variants insist on it, spectral ones then use
         that one at every wavelength.
@@ -116,13 +123,14 @@ def write_pbsdf(
     Raises
     ------
     ModelError
-        If a parameter is an array, or wavelengths and models do not match or are too many for the plugin.
+        If a parameter is an array, wavelengths and models do not match or are too many for the plugin, or a model
+        somewhere is not finite or below 0, by more than a millionth of its value in the mirror direction of 30°.
     DataError
         If the file cannot be written.
     """
     path = _checked(path)
     ordered = _by_wavelength(_models(models), wavelengths)
-    table, errors = refined_table(
+    table, errors, below = refined_table(
         list(ordered.values()),
         list(ordered),
         median=median,
@@ -139,6 +147,7 @@ def write_pbsdf(
         errors=errors,
         accurate=all(e.median <= median and e.percentile_99 <= percentile_99 for e in errors),
         alpha_sample=float(f"{math.sqrt(2.0) * width:.2g}"),
+        below=below,
     )
 
 
@@ -148,7 +157,8 @@ def write_merl(
     """Tabulate the BRDF under natural light as a MERL ``.binary`` file.
 
     The cells hold the value at their middle, the mean of both directions of the light: the format takes reciprocity
-    for granted. Cells with a direction below the horizon are invalid.
+    for granted. Cells with a direction below the horizon are invalid; elsewhere a value below 0 by rounding is 0 in the
+    file, as a reader would take it for none.
 
     Parameters
     ----------
@@ -167,7 +177,8 @@ def write_merl(
     Raises
     ------
     ModelError
-        If there are neither one nor three models, or a parameter is an array.
+        If there are neither one nor three models, a parameter is an array, or a model somewhere is not finite or below
+        0, see :func:`write_pbsdf`.
     DataError
         If the file cannot be written.
     """
@@ -182,7 +193,9 @@ def write_merl(
         above = (theta_i < np.pi / 2) & (theta_r < np.pi / 2)
         for which, model in enumerate(given):
             one_way = np.full(above.shape, np.nan)
-            one_way[above] = model.stokes(theta_i[above], theta_r[above], phi[above])[:, 0]
+            geometry = theta_i[above], theta_r[above], phi[above]
+            f00 = model.stokes(*geometry)[:, :1, np.newaxis]
+            one_way[above] = storable(f00, model, *geometry).values[:, 0, 0]
             # Exchanging the rays is φ_d + π, and the mirror image of that π − φ_d: the axis turned round.
             planes[which, row] = 0.5 * (one_way + one_way[:, ::-1])
         if progress is not None:
@@ -220,12 +233,15 @@ def grid_dataset(
     Raises
     ------
     ModelError
-        If a parameter is an array or wavelengths and models do not match.
+        If a parameter is an array, wavelengths and models do not match, or a model is not finite at a geometry: a data
+        set would leave it out as not measured. What is below 0 is kept; to read it back is to be told.
     """
     given = _models(models)
     stated = _matching(given, wavelengths)
     angles = [np.ravel(a) for a in np.broadcast_arrays(theta_i, theta_r, phi)]
     matrices = [model.mueller(*angles) for model in given]
+    for model, found in zip(given, matrices, strict=True):
+        require_finite(found, model, *angles)
     rows = len(angles[0])
     repeated = [np.tile(a, len(given)) for a in angles]
     return make_dataset(

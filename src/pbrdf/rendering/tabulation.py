@@ -18,8 +18,16 @@ from numpy.typing import NDArray
 from pbrdf.data.formats.pbsdf import HORIZON, PolarizedTable, mueller_to_pbsdf
 from pbrdf.models import Model
 from pbrdf.optics.half_difference import directions, half_difference
+from pbrdf.rendering.storable import Storable, darkest, storable
 
-__all__ = ["LARGEST_TABLE", "ZENITH_LIMIT", "TableError", "random_directions", "refined_table"]
+__all__ = [
+    "LARGEST_TABLE",
+    "ZENITH_LIMIT",
+    "RefinedTable",
+    "TableError",
+    "random_directions",
+    "refined_table",
+]
 
 Array = NDArray[np.float64]
 Progress = Callable[[int, int], None]
@@ -42,8 +50,6 @@ _ATTEMPTS = 4
 _LARGEST_STEPS = np.radians([8.0, 6.0, 20.0])
 _LINES = 200
 _MIRROR = np.float32(np.outer([1, 1, -1, -1], [1, 1, -1, -1]))
-#: Where a model is darker than this share of its specular peak, errors are counted against that.
-_DARK = 1e-6
 #: Share of the lines along which a step keeps within the tolerance.
 _QUANTILE = 0.97
 
@@ -67,6 +73,25 @@ class TableError(NamedTuple):
     median: float
     percentile_99: float
     geometries: int
+
+
+class RefinedTable(NamedTuple):
+    """What :func:`refined_table` makes.
+
+    Attributes
+    ----------
+    table
+        The table; the best one within :data:`LARGEST_TABLE` where the accuracy cannot be had.
+    errors
+        Its errors for ``"hemisphere"``, ``"lobe"`` and ``"both"``: at the worst wavelength.
+    below
+        Number of cells, of all wavelengths, that are 0 because the model's f00 is below 0 by rounding, see
+        :func:`pbrdf.rendering.storable.storable`.
+    """
+
+    table: PolarizedTable
+    errors: list[TableError]
+    below: int
 
 
 class _Needs(NamedTuple):
@@ -125,7 +150,7 @@ def refined_table(
     percentile_99: float,
     points: int = 20_000,
     progress: Progress | None = None,
-) -> tuple[PolarizedTable, list[TableError]]:
+) -> RefinedTable:
     """Tabulate models, one for each wavelength, with as many nodes as the accuracy asks for.
 
     Parameters
@@ -142,12 +167,10 @@ def refined_table(
     progress
         Called with the finished and all parts of the table; it starts anew when the table is refined.
 
-    Returns
-    -------
-    table
-        The table; the best one within :data:`LARGEST_TABLE` where the accuracy cannot be had.
-    errors
-        Its errors for ``"hemisphere"``, ``"lobe"`` and ``"both"``: at the worst wavelength.
+    Raises
+    ------
+    ModelError
+        If a model is not finite somewhere, or below 0; see :func:`pbrdf.rendering.storable.storable`.
     """
     samples = [random_directions(float(model.lobe_width()), points) for model in models]
     needs = [_needs(models, axis) for axis in range(3)]
@@ -157,19 +180,21 @@ def refined_table(
         finest *= 1.1
     tolerance = max(first, finest)
     for _ in range(_ATTEMPTS):
-        table = _table(models, wavelengths, _axes(needs, tolerance), progress)
+        table, below = _table(models, wavelengths, _axes(needs, tolerance), progress)
         errors = _errors(models, table, samples)
         excess = max(max(e.median / median, e.percentile_99 / percentile_99) for e in errors)
         if excess <= 1.0 or tolerance == finest:
             break
         tolerance = max(0.9 * tolerance / excess, finest)
-    return table, errors
+    return RefinedTable(table, errors, below)
 
 
-def _matrices(model: Model, theta_h: Array, theta_d: Array, phi_d: Array) -> Array:
+def _matrices(model: Model, theta_h: Array, theta_d: Array, phi_d: Array) -> Storable:
     """Mueller matrices in the convention of the file; shape (..., 4, 4)."""
     seen = _filled_from(theta_h, theta_d, phi_d)
-    return mueller_to_pbsdf(model.mueller(*directions(theta_h, theta_d, seen)), theta_h, theta_d, seen)
+    geometry = directions(theta_h, theta_d, seen)
+    found = storable(model.mueller(*geometry), model, *geometry)
+    return found._replace(values=mueller_to_pbsdf(found.values, theta_h, theta_d, seen))
 
 
 def _filled_from(theta_h: Array, theta_d: Array, phi_d: Array) -> Array:
@@ -183,11 +208,6 @@ def _filled_from(theta_h: Array, theta_d: Array, phi_d: Array) -> Array:
     bound = np.clip(bound, 0.0, 1.0)
     nearest = np.copysign(np.arccos(np.clip(np.cos(phi_d), -bound, bound)), phi_d)
     return np.where(below, nearest, phi_d)
-
-
-def _darkest(model: Model) -> float:
-    """The least f00 against which errors are counted, 1/sr."""
-    return _DARK * float(model.mueller(math.radians(30.0), math.radians(30.0), 0.0)[0, 0])
 
 
 def _needs(models: Sequence[Model], axis: int) -> _Needs:
@@ -207,10 +227,10 @@ def _needs(models: Sequence[Model], axis: int) -> _Needs:
         angles[axis] = np.broadcast_to(along, angles[axis].shape)
         theta_i, theta_r, _ = directions(*angles)
         lowest = np.minimum(np.cos(theta_i), np.cos(theta_r))
-        f = _matrices(model, *angles)
+        f = _matrices(model, *angles).values
         middle = f[:, 1::2]
         off = np.abs(middle - (f[:, :-1:2] + f[:, 2::2]) / 2.0).max((-1, -2))
-        off /= np.maximum(middle[..., 0, 0], _darkest(model))
+        off /= np.maximum(middle[..., 0, 0], darkest(model))
         # Near the horizon models run steeply to 0 or far up: less is asked for there.
         off *= np.minimum(lowest[:, 1::2] / math.cos(ZENITH_LIMIT), 1.0) ** 2
         valid = np.minimum(np.minimum(lowest[:, :-1:2], lowest[:, 1::2]), lowest[:, 2::2]) > _FILL_COSINE
@@ -249,21 +269,25 @@ def _table(
     wavelengths: Sequence[int],
     axes: Sequence[NDArray[np.float32]],
     progress: Progress | None,
-) -> PolarizedTable:
+) -> tuple[PolarizedTable, int]:
+    """The table on given nodes, and how many cells of it :class:`RefinedTable` counts as below 0."""
     # The model is evaluated where the nodes are after rounding.
     theta_h, theta_d, phi_d = (nodes.astype(np.float64) for nodes in axes)
     shape = (len(phi_d), len(theta_d), len(theta_h), len(models), 4, 4)
     matrices = np.empty(shape, dtype=np.float32)
-    middle = len(phi_d) // 2
+    middle, below = len(phi_d) // 2, 0
     for index in range(middle, len(phi_d)):
         cells = np.broadcast_arrays(theta_h, theta_d[:, np.newaxis], phi_d[index])
         for which, model in enumerate(models):
-            matrices[index, :, :, which] = _matrices(model, *cells)
+            matrices[index, :, :, which], under = _matrices(model, *cells)
+            below += int(under.sum()) * (1 if index == middle else 2)
         # −φ_d is the mirror image (docs/conventions.md, "Mirror symmetry").
         matrices[2 * middle - index] = matrices[index] * _MIRROR
         if progress is not None:
             progress(index - middle + 1, len(phi_d) - middle)
-    return PolarizedTable(axes[0], axes[1], axes[2], np.asarray(wavelengths, dtype=np.uint16), matrices)
+    return PolarizedTable(
+        axes[0], axes[1], axes[2], np.asarray(wavelengths, dtype=np.uint16), matrices
+    ), below
 
 
 def _errors(
@@ -276,7 +300,7 @@ def _errors(
         for region, geometry in sample.items():
             exact = model.mueller(*geometry)
             difference = np.abs(table.mueller(*geometry, which) - exact).max((-1, -2))
-            off[region] = difference / np.maximum(exact[:, 0, 0], _darkest(model))
+            off[region] = difference / np.maximum(exact[:, 0, 0], darkest(model))
         off["both"] = np.concatenate(list(off.values()))
         for region, values in off.items():
             median, high = np.quantile(values, (0.5, 0.99))

@@ -175,3 +175,14 @@ def test_only_whole_tables_are_written(tmp_path):
     with pytest.raises(DataError, match="cannot be written"):
         write_planes(np.zeros((3, 90, 90, 180)), tmp_path / "nowhere" / "paint.binary")
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(("value", "said"), [(-1e-9, "-1e-09"), (np.inf, "inf")])
+def test_what_readers_would_take_for_no_value_is_not_written(tmp_path, value, said):
+    planes = np.ones((3, 90, 90, 180))
+    planes[1, 40, 10, 20] = value
+    with pytest.raises(
+        DataError, match=rf"green is {said} in the cell \(40, 10, 20\): the format holds finite values"
+    ):
+        write_planes(planes, tmp_path / "paint.binary")
+    assert list(tmp_path.iterdir()) == []

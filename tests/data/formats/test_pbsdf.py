@@ -34,9 +34,25 @@ def tabulated(*models: DoubleGauss) -> PolarizedTable:
     return PolarizedTable(theta_h, theta_d, phi_d, wavelength, matrices)
 
 
+def store(table: PolarizedTable, path) -> None:
+    """A file as others write it, whatever the table holds."""
+    fields = {name: getattr(table, name)[np.newaxis] for name in ("theta_h", "theta_d", "phi_d")}
+    fields |= {"wvls": table.wavelength, "M": table.matrices}
+    write_tensors(fields, path)
+
+
+def filled(table: PolarizedTable) -> PolarizedTable:
+    """With a depolariser of 1/sr in place of what is missing."""
+    missing = np.isnan(table.matrices[..., :1, :1])
+    return replace(
+        table,
+        matrices=np.where(missing, np.diag(np.float32([1, 0, 0, 0])), table.matrices).astype(np.float32),
+    )
+
+
 @pytest.fixture
 def file(tmp_path):
-    write_table(tabulated(METAL, GLASS), tmp_path / "two.pbsdf")
+    store(tabulated(METAL, GLASS), tmp_path / "two.pbsdf")
     return tmp_path / "two.pbsdf"
 
 
@@ -58,7 +74,7 @@ def test_cells_below_the_horizon_and_without_a_value_are_left_out(file):
     assert np.isfinite(ds["mueller"]).all()
     table = tabulated(METAL)
     table.matrices[4, 1, 2, 0, 3, 3] = np.nan
-    write_table(table, file)
+    store(table, file)
     assert read(file, every=1).sizes["geometry"] == ds.sizes["geometry"] / 2 - 1
 
 
@@ -66,7 +82,7 @@ def test_a_finite_value_below_the_horizon_is_no_measurement(file):
     """Tables are filled there, so that interpolation at the edge works."""
     table = tabulated(METAL)
     rows = read(file, every=1, wavelength=450).sizes["geometry"]
-    write_table(replace(table, matrices=np.nan_to_num(table.matrices, nan=1.0)), file)
+    write_table(filled(table), file)
     assert read(file, every=1).sizes["geometry"] == rows
 
 
@@ -139,17 +155,17 @@ def test_the_table_interpolates_linearly_and_holds_the_last_node_outside(tmp_pat
 
 
 def test_a_simulated_table_says_so(tmp_path):
-    table = replace(tabulated(GLASS), description=f"{SIMULATED} 1: glass")
+    table = replace(filled(tabulated(GLASS)), description=f"{SIMULATED} 1: glass")
     write_table(table, tmp_path / "glass.pbsdf")
     ds = read(tmp_path / "glass.pbsdf")
     assert ds.attrs["simulated"] == 1
     assert ds.attrs["source"] == f"glass.pbsdf: {SIMULATED} 1: glass"
-    write_table(tabulated(GLASS), tmp_path / "glass.pbsdf")
+    write_table(filled(tabulated(GLASS)), tmp_path / "glass.pbsdf")
     assert read(tmp_path / "glass.pbsdf").attrs["simulated"] == 0
 
 
 def test_mitsubas_plugin_holds_five_wavelengths(tmp_path):
-    table = tabulated(*[GLASS] * 5)
+    table = filled(tabulated(*[GLASS] * 5))
     write_table(table, tmp_path / "five.pbsdf")
     six = np.concatenate([table.matrices, table.matrices[:, :, :, :1]], axis=3)
     with pytest.raises(DataError, match=r"6 wavelengths are too many: .* at most 5"):
@@ -165,6 +181,73 @@ def test_five_wavelengths_can_be_read_where_the_file_has_fewer(file):
     raw = file.read_bytes()
     at = read_tensors(file)["wvls"].offset
     assert at + 10 < len(raw)
+
+
+def test_descending_wavelengths_of_others_keep_their_names(file):
+    """Each matrix is read under the wavelength that stands with it, though the plugin takes one for another."""
+    table = tabulated(METAL, GLASS)
+    store(replace(table, wavelength=table.wavelength[::-1]), file)
+    for wavelength, model in ((500, METAL), (450, GLASS)):
+        ds = read(file, every=1, wavelength=wavelength)
+        exact = model.mueller(ds["theta_i"].values, ds["theta_r"].values, ds["phi"].values)
+        assert_allclose(ds["mueller"][:, 0, 0], exact[:, 0, 0], rtol=1e-6)
+    both = read(file, every=1)
+    assert set(both["wavelength"].values) == {450.0, 500.0}
+
+
+def test_an_intensity_below_0_of_others_is_noise_and_kept(file):
+    """To leave out what noise takes below 0 would make the dark brighter; `check` tells of it."""
+    table = tabulated(METAL)
+    table.matrices[4, 1, 2, 0] = np.float32(-1e-3) * np.eye(4)
+    store(table, file)
+    ds = read(file, every=1)
+    assert ds["mueller"].values[:, 0, 0].min() == pytest.approx(-1e-3)
+    assert any("m00 = -0.001 is not positive" in str(issue) for issue in check(ds))
+
+
+def _changed(matrices: np.ndarray, element: tuple[int, ...], value: float) -> np.ndarray:
+    matrices = matrices.copy()
+    matrices[(4, 1, 2, 1, *element)] = value
+    return matrices
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (
+            lambda t: {"wavelength": t.wavelength[::-1]},
+            r"wavelengths 500, 450 nm do not ascend: .* sort them",
+        ),
+        (lambda t: {"wavelength": np.uint16([450, 450])}, "450, 450 nm do not ascend"),
+        (lambda t: {"theta_d": t.theta_d[::-1]}, "nodes of theta_d are not two or more ascending"),
+        (
+            lambda t: {"matrices": _changed(t.matrices, (3, 3), np.nan)},
+            r"cell at theta_h = 17\.189°, theta_d = 22\.918°, phi_d = 0° and 500 nm holds no number",
+        ),
+        (lambda t: {"matrices": _changed(t.matrices, (2, 1), np.inf)}, "500 nm holds no number"),
+        (
+            lambda t: {"matrices": _changed(t.matrices, (0, 0), -1e-9)},
+            r"500 nm has M00 = -1e-09 beside other elements",
+        ),
+        (
+            lambda t: {"matrices": _changed(t.matrices, (0, 0), 0.0)},
+            "500 nm has M00 = 0 beside other elements",
+        ),
+    ],
+)
+def test_what_the_plugin_would_answer_wrongly_is_not_written(tmp_path, change, words):
+    """The path is named and nothing is left of the file."""
+    table = filled(tabulated(METAL, GLASS))
+    with pytest.raises(DataError, match=rf"wrong\.pbsdf: .*{words}"):
+        write_table(replace(table, **change(table)), tmp_path / "wrong.pbsdf")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_cell_that_reflects_nothing_at_all_is_written(tmp_path):
+    table = filled(tabulated(METAL))
+    table.matrices[4, 1, 2] = 0.0
+    write_table(table, tmp_path / "dark.pbsdf")
+    assert read_table(tmp_path / "dark.pbsdf").matrices[4, 1, 2, 0, 0, 0] == 0.0
 
 
 @pytest.mark.parametrize(

@@ -115,19 +115,27 @@ def write_planes(planes: ArrayLike, path: str | Path) -> None:
     Parameters
     ----------
     planes
-        1/sr, shape (3, 90, 90, 180); NaN becomes −1.
+        1/sr, shape (3, 90, 90, 180); NaN, no value, becomes −1.
     path
         The file; replaced, when the new one is complete, if it exists.
 
     Raises
     ------
     DataError
-        If the shape is another, or the file cannot be written.
+        If the shape is another, a value is infinite or below 0, which the format takes for none, or the file cannot
+        be written.
     """
     path = Path(path)
     values = np.asarray(planes, dtype=np.float64)
     if values.shape != (len(COLOURS), *SHAPE):
         raise DataError(f"{path}: planes of the shape {values.shape}; {(len(COLOURS), *SHAPE)} is needed")
+    wrong = (values < 0.0) | np.isinf(values)
+    if wrong.any():
+        colour, *cell = np.argwhere(wrong)[0].tolist()
+        raise DataError(
+            f"{path}: {COLOURS[colour]} is {values[(colour, *cell)]:.4g} in the cell {tuple(cell)}: the format holds "
+            "finite values from 0, and takes others for none"
+        )
     raw = values / _SCALES[:, np.newaxis, np.newaxis, np.newaxis]
     with atomic_file(path) as beside, beside.open("wb") as file:
         file.write(_HEADER.pack(*SHAPE))

@@ -14,7 +14,7 @@ first or last node outside.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -168,14 +168,7 @@ def read_table(path: str | Path) -> PolarizedTable:
             f"{path}: the field 'M' has the shape {fields['M'].shape}, but the axes ask for {(*counts, 4, 4)}"
         )
     nodes = {name: np.array(fields[name]).ravel() for name in _AXES}
-    for name, values in nodes.items():
-        limit = np.pi if name == "phi_d" else np.pi / 2
-        low = -limit if name == "phi_d" else 0.0
-        # float32's π is a little larger than π
-        if len(values) < 2 or not (np.diff(values) > 0).all() or values[0] < low - 1e-6:
-            raise DataError(f"{path}: the nodes of {name} are not two or more ascending angles in radians")
-        if values[-1] > limit + 1e-6:
-            raise DataError(f"{path}: {name} reaches {values[-1]:g}, beyond {limit:g} rad: is it in degrees?")
+    _check_nodes(nodes, path)
     if not counts[-1]:
         raise DataError(f"{path}: there is no wavelength in the table")
     text = fields.get("description", np.empty(0, np.uint8))
@@ -185,13 +178,25 @@ def read_table(path: str | Path) -> PolarizedTable:
     )
 
 
+def _check_nodes(nodes: Mapping[str, NDArray[np.floating[Any]]], path: Path) -> None:
+    for name, values in nodes.items():
+        limit = np.pi if name == "phi_d" else np.pi / 2
+        low = -limit if name == "phi_d" else 0.0
+        # float32's π is a little larger than π
+        if len(values) < 2 or not (np.diff(values) > 0).all() or values[0] < low - 1e-6:
+            raise DataError(f"{path}: the nodes of {name} are not two or more ascending angles in radians")
+        if values[-1] > limit + 1e-6:
+            raise DataError(f"{path}: {name} reaches {values[-1]:g}, beyond {limit:g} rad: is it in degrees?")
+
+
 def write_table(table: PolarizedTable, path: str | Path) -> None:
-    """Write a ``.pbsdf`` file; it replaces `path` when complete.
+    """Write a ``.pbsdf`` file that the plugin reads right; it replaces `path` when complete.
 
     Raises
     ------
     DataError
-        If there are more wavelengths than the plugin can hold, or the file cannot be written.
+        If the plugin would answer wrongly: there are more wavelengths than it can hold, or they do not ascend; nodes do
+        not ascend; a cell is not finite, or has no M00 above 0 and is not 0 altogether. If the file cannot be written.
     """
     path = Path(path)
     if len(table.wavelength) > MOST_WAVELENGTHS:
@@ -199,11 +204,40 @@ def write_table(table: PolarizedTable, path: str | Path) -> None:
             f"{path}: {len(table.wavelength)} wavelengths are too many: Mitsuba's measured_polarized reads at most "
             f"{MOST_WAVELENGTHS} and runs over the end of its array with more; write several files"
         )
+    if not (np.diff(table.wavelength.astype(np.int64)) > 0).all():
+        raise DataError(
+            f"{path}: the wavelengths {', '.join(map(str, table.wavelength))} nm do not ascend: Mitsuba's "
+            "measured_polarized would take one for another; sort them, and the matrices with them"
+        )
+    _check_nodes({name: getattr(table, name) for name in _AXES}, path)
+    _check_cells(table, path)
     fields = {name: getattr(table, name)[np.newaxis] for name in _AXES}
     if table.description:
         fields["description"] = np.frombuffer(table.description.encode(), dtype=np.uint8)
     # The plugin reads five wavelengths even where there are fewer: M behind them keeps that within the file.
     write_tensors({**fields, "wvls": table.wavelength, "M": table.matrices}, path)
+
+
+def _check_cells(table: PolarizedTable, path: Path) -> None:
+    """Refuse what blackens the cells around it, and polarised light without intensity."""
+    for p, phi_d in enumerate(table.phi_d):
+        cells = table.matrices[p]
+        m00 = cells[..., 0, 0]
+        missing = ~np.isfinite(cells).all((-1, -2))
+        wrong = missing | ~(m00 > 0) & (cells != 0).any((-1, -2))
+        if wrong.any():
+            d, h, w = np.argwhere(wrong)[0].tolist()
+            angles = np.rad2deg([table.theta_h[h], table.theta_d[d], phi_d])
+            named = ", ".join(f"{name} = {a:.5g}°" for name, a in zip(_AXES, angles, strict=True))
+            found = (
+                "holds no number in an element"
+                if missing[d, h, w]
+                else f"has M00 = {m00[d, h, w]:.4g} beside other elements"
+            )
+            raise DataError(
+                f"{path}: the cell at {named} and {table.wavelength[w]} nm {found}: Mitsuba's measured_polarized would "
+                "show its neighbours black, or polarised light without intensity"
+            )
 
 
 def read_pbsdf(
@@ -224,8 +258,9 @@ def read_pbsdf(
     Returns
     -------
     xarray.Dataset
-        ``mueller`` as a BRDF in 1/sr at the nodes of the table, φ_d by φ_d, then θ_d, θ_h and wavelength. Cells
-        with a direction below the horizon or without a value are left out.
+        ``mueller`` as a BRDF in 1/sr at the nodes of the table, φ_d by φ_d, then θ_d, θ_h and wavelength, in
+        the file's order, each under its own name also where they descend. Cells with a direction below the horizon or
+        an element that is not finite are left out; an M00 below 0 is noise, and is kept.
 
     Raises
     ------
