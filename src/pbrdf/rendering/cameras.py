@@ -57,9 +57,19 @@ def camera_scenes(scene: Any) -> list[Any]:
         # the film of the batch stands for those of its cameras, which keep the size alone
         width, height = (int(n) for n in camera.film().size())
         camera.m_film = mi.load_dict(
-            {"type": "hdrfilm", "width": width, "height": height, "rfilter": film.rfilter()}
+            {
+                "type": "hdrfilm",
+                "width": width,
+                "height": height,
+                "pixel_format": "luminance",
+                "rfilter": film.rfilter(),
+            }
         )
+        names = {shape: shape.id() for shape in shapes.values()}
         scenes.append(mi.load_dict({"type": "scene", "camera": camera, **shapes, **lights}))
+        # which have been renamed by the keys above
+        for shape, name in names.items():
+            shape.set_id(name)
     return scenes
 
 

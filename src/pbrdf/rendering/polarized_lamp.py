@@ -22,6 +22,8 @@ from pbrdf.optics.elements import diattenuator, retarder
 __all__ = ["POLARIZED_PLUGIN", "LampPolarization", "polarized_dict", "register_polarized_lamp"]
 
 POLARIZED_PLUGIN = "pbrdf_polarized"
+#: Beside the lamp; Mitsuba itself knows the last two.
+_PROPERTIES = {"polarizer", "retarder", "retardance", "to_world", "sampling_weight"}
 
 
 @dataclass(frozen=True)
@@ -87,10 +89,14 @@ def register_polarized_lamp() -> None:
     class PolarizedEmitter(mi.Emitter):
         def __init__(self, props: Any) -> None:
             super().__init__(props)
-            lamps = [props[name] for name in props if isinstance(props[name], mi.Emitter)]
+            lamps = {name: props[name] for name in props if isinstance(props[name], mi.Emitter)}
+            unknown = sorted(set(props) - set(lamps) - _PROPERTIES)
+            if unknown:
+                raise PbrdfError(f"{POLARIZED_PLUGIN}: there is no property {unknown[0]}")
             if len(lamps) != 1:
                 raise PbrdfError(f"{POLARIZED_PLUGIN}: it takes one emitter, not {len(lamps)}")
-            if lamps[0].is_environment():
+            (self.lamp,) = lamps.values()
+            if self.lamp.is_environment():
                 raise PbrdfError(f"{POLARIZED_PLUGIN}: light from all around has no polariser before it")
             if "polarizer" not in props:
                 raise PbrdfError(f"{POLARIZED_PLUGIN}: give the angle of its polarizer, radians")
@@ -99,7 +105,6 @@ def register_polarized_lamp() -> None:
                 float(props.get("retarder", 0.0)),
                 float(props.get("retardance", 0.0)),
             )
-            self.lamp = lamps[0]
             self.up = self.world_transform() @ mi.Vector3f(0.0, 1.0, 0.0)
             # V > 0 is right circular in Mitsuba
             self.stokes = [mi.Float(float(s)) for s in self.polarization.stokes * [1.0, 1.0, 1.0, -1.0]]
