@@ -85,8 +85,8 @@ def test_the_light_comes_from_where_it_is_said_to(run, tmp_path, paint):
 
 @pytest.mark.slow
 def test_a_lamp_may_stand_behind_a_polariser_and_a_retarder(run, tmp_path, paint):
-    """A panel, lit and seen at 42°, mirrors left circular light as right circular, V < 0, and less of light in the plane
-    of incidence than of light across it."""
+    """A panel, lit and seen at 42°, mirrors left circular light as right circular, V < 0, and less of light in the
+    plane of incidence than of light across it."""
     from pbrdf.rendering.picture import read_exr
 
     options = ("--scene", "plate", "--light", "point", *SMALL, "-o", "a.exr")

@@ -55,8 +55,8 @@ class LampPolarization:
     @property
     def stokes(self) -> np.ndarray:
         """(I, Q, U, V) of the light, shape (4,), of a lamp of intensity 1: half of it passes."""
-        elements = retarder(self.retarder, self.retardance) @ diattenuator(self.polarizer)
-        return elements @ np.array([1.0, 0.0, 0.0, 0.0])
+        light: np.ndarray = retarder(self.retarder, self.retardance) @ diattenuator(self.polarizer)[:, 0]
+        return light
 
 
 def polarized_dict(lamp: dict[str, Any], polarization: LampPolarization, to_world: Any) -> dict[str, Any]:
