@@ -7,6 +7,7 @@ import pytest
 from scene_helpers import sees
 
 from pbrdf.errors import PbrdfError
+from pbrdf.instruments.polarimeter.polarimeter import rotating_retarder
 from pbrdf.rendering.lights import light_dict
 from pbrdf.rendering.polarized_lamp import LampPolarization, polarized_dict
 from pbrdf.rendering.render import render_stokes
@@ -71,13 +72,16 @@ def test_who_looks_into_the_lamp_sees_what_was_asked_for(mitsuba, degrees, q, u,
 @pytest.mark.parametrize("retardance", [30.0, 90.0, 180.0])
 def test_one_angle_means_one_sense_for_polariser_and_retarder(mitsuba, retardance):
     """Light that a polariser at 30° has passed lies along the fast axis of a retarder at 30°, which then does nothing:
-    in the lamp, in the picture's view through a polariser, and in the instruments' elements. Mitsuba's own `polarizer`
+    in the lamp, in the picture's view through a polariser, and in an instrument before it. Mitsuba's own `polarizer`
     and `retarder` turn by their `theta` in opposite senses: there the retarder at −30° does nothing, and it is the
     polariser whose `theta` is the reverse of our angle, as seen against the light."""
     with_plate, without = (sees(lamp(*d), INTO_LAMP) for d in ((30.0, 30.0, retardance), (30.0,)))
     assert middle(with_plate) == pytest.approx(middle(without), rel=1e-5)
     assert without.through_polarizer(30.0 * DEG)[0, 0] == pytest.approx(without.stokes[0, 0, 0], rel=1e-5)
     assert without.through_polarizer(120.0 * DEG)[0, 0] == pytest.approx(0.0, abs=1e-5)
+
+    instrument = rotating_retarder(30.0 * DEG, retardance * DEG, analyzer=30.0 * DEG)
+    assert instrument.intensities(without.stokes)[0, 0, 0] == pytest.approx(without.stokes[0, 0, 0], rel=1e-5)
 
     def behind_sheets(polarizer, retarder):
         first = {"type": "polarizer", "theta": number(polarizer)}
