@@ -51,6 +51,7 @@ def camera_scenes(scene: Any) -> list[Any]:
         )
     shapes = {f"shape{i}": shape for i, shape in enumerate(scene.shapes())}
     lights = {f"light{i}": lamp for i, lamp in enumerate(scene.emitters()) if lamp.get_shape() is None}
+    names = {shape: shape.id() for shape in shapes.values()}
     scenes = []
     for camera in cameras:
         _require_camera(camera)
@@ -65,7 +66,6 @@ def camera_scenes(scene: Any) -> list[Any]:
                 "rfilter": film.rfilter(),
             }
         )
-        names = {shape: shape.id() for shape in shapes.values()}
         scenes.append(mi.load_dict({"type": "scene", "camera": camera, **shapes, **lights}))
         # which have been renamed by the keys above
         for shape, name in names.items():
