@@ -19,6 +19,7 @@ import pbrdf
 from pbrdf.rendering import bsdf_dict
 from pbrdf.rendering.export import write_pbsdf
 from pbrdf.rendering.picture import StokesPicture
+from pbrdf.rendering.polarized_lamp import LampPolarization
 from pbrdf.rendering.render import render_stokes
 from pbrdf.rendering.scenes import make_scene, subject
 from pbrdf.rendering.sky import Sky
@@ -104,6 +105,36 @@ def comparison_figure(plugin: StokesPicture, file: StokesPicture) -> Any:
         return figure
 
 
+def polarized_lamp(target: Path) -> None:
+    """What a lamp's polariser does to the light that a panel mirrors, and circular light on a sphere."""
+
+    def lit(name: str, lamp: LampPolarization) -> np.ndarray:
+        what = subject(name, [bsdf_dict(SEMIGLOSS)])
+        return render_stokes(make_scene(what, "area", (200, 200), polarization=lamp), spp=512).stokes
+
+    level, upright = (lit("plate", LampPolarization(angle))[0] for angle in (0.0, 0.5 * math.pi))
+    circular = lit("sphere", LampPolarization(0.0, -0.25 * math.pi, 0.5 * math.pi))
+    top = float(np.percentile(level, 99.0))
+    with styled():
+        figure = new_figure(8.6, 3.0)
+        axes = figure.subplots(1, 3)
+        for ax, name, seen in ((axes[0], "0°", level), (axes[1], "90°", upright)):
+            shown = ax.imshow((seen / top).clip(0.0, 1.0) ** (1 / 2.2), cmap="gray", vmin=0.0, vmax=1.0)
+            ax.set_title(f"polariser of the lamp at {name}", fontsize=9.0)
+        figure.colorbar(shown, ax=axes[1], shrink=0.8, ticks=[]).set_label("radiance (display scale)")
+        with np.errstate(invalid="ignore"):
+            shown = axes[2].imshow(circular[3] / circular[0], cmap="RdBu_r", vmin=-1.0, vmax=1.0)
+        axes[2].set_title("left circular light: S3/S0", fontsize=9.0)
+        figure.colorbar(shown, ax=axes[2], shrink=0.8)
+        for ax in axes:
+            ax.set_xticks([])
+            ax.set_yticks([])
+            ax.grid(False)
+            for spine in ax.spines.values():
+                spine.set_visible(False)
+        save_small(figure, target)
+
+
 def inverse_rendering(target: Path) -> None:
     """Convergence of the worked example."""
     spec = importlib.util.spec_from_file_location(
@@ -135,6 +166,7 @@ PICTURES: dict[str, Callable[[Path], None]] = {
     "fender": fender,
     "spheres": spheres,
     "pbsdf-vs-plugin": pbsdf_vs_plugin,
+    "polarized-lamp": polarized_lamp,
     "inverse-rendering": inverse_rendering,
 }
 

@@ -84,6 +84,28 @@ def test_the_light_comes_from_where_it_is_said_to(run, tmp_path, paint):
 
 
 @pytest.mark.slow
+def test_a_lamp_may_stand_behind_a_polariser_and_a_retarder(run, tmp_path, paint):
+    """A panel, lit and seen at 42°, mirrors left circular light as right circular, V < 0, and less of light in the
+    plane of incidence than of light across it."""
+    from pbrdf.rendering.picture import read_exr
+
+    options = ("--scene", "plate", "--light", "point", *SMALL, "-o", "a.exr")
+    middle = {}
+    for name, arguments in {
+        "left": ("--lamp-polarizer", 0, "--lamp-retarder", "-45,90"),
+        "across": ("--lamp-polarizer", 0),
+        "along": ("--lamp-polarizer", 90),
+    }.items():
+        run("render", paint, *options, *arguments)
+        picture = read_exr(tmp_path / "a.exr")
+        middle[name] = picture.stokes[:, 7:9, 11:13].mean((1, 2))
+    assert "polariser at 90 deg" in picture.attrs["before the lamp"]
+    assert middle["left"][3] < -0.1 * middle["left"][0]
+    assert middle["along"][0] < 0.7 * middle["across"][0]
+    assert middle["across"][1] > 0.5 * middle["across"][0]
+
+
+@pytest.mark.slow
 def test_a_scene_file_is_rendered_in_its_own_size(run, tmp_path, paint):
     (tmp_path / "scene.xml").write_text(
         """<scene version="3.0.0">
@@ -115,6 +137,17 @@ def test_a_scene_file_is_rendered_in_its_own_size(run, tmp_path, paint):
         (("PAINT", "--light", "constant", "--sun-zenith", "30"), "constant has no direction"),
         (("PAINT", "--scene", "a.xml", "--light", "sky"), "brings its own lights: leave --light out"),
         (("PAINT", "--polarizer", "nan"), "--polarizer: give an angle"),
+        (("PAINT", "--lamp-polarizer", "0"), "--lamp-polarizer is for --light point or area"),
+        (("PAINT", "--light", "area", "--lamp-polarizer", "inf"), "--lamp-polarizer: give an angle"),
+        (("PAINT", "--light", "area", "--lamp-retarder", "0,90"), "give --lamp-polarizer too"),
+        (
+            ("PAINT", "--light", "area", "--lamp-polarizer", "0", "--lamp-retarder", "45"),
+            "--lamp-retarder 45: give the angle of its fast axis and its retardance",
+        ),
+        (
+            ("PAINT", "--scene", "a.xml", "--lamp-polarizer", "0"),
+            "its own lights: leave --lamp-polarizer out",
+        ),
         (("PAINT", "--variant", "llvm_ad_rgb"), "only these carry polarisation"),
         (("PAINT", "--depth", "0"), "use 1 or more"),
         (("PAINT", "-o", "missing/out.exr"), "there is no folder missing"),

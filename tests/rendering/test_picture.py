@@ -49,6 +49,18 @@ def test_layers_are_named_and_come_back(mitsuba, picture, tmp_path):
     assert "left circular" in back.attrs["convention"]
 
 
+def test_bright_light_and_weak_polarisation_are_kept(mitsuba, tmp_path):
+    """Channels of 32 bits: halves end at 65504 and know degrees of polarisation in steps of 5e-4 alone."""
+    stokes = np.array([1e6, 1.0, -1.0, 0.5])[:, None, None] * np.array([[1.0, 1e-6, 2e5]])
+    write_exr(StokesPicture(stokes, np.full_like(stokes, np.nan)), tmp_path / "p.exr")
+    channels = mitsuba.Bitmap(str(tmp_path / "p.exr")).struct_()
+    assert {c.type for c in channels} == {mitsuba.Struct.Type.Float32}
+    assert {c.name for c in channels} == {"S0.Y", "S1.Y", "S2.Y", "S3.Y", "DoLP.Y", "AoLP.Y"}
+    back = read_exr(tmp_path / "p.exr")
+    assert back.stokes == pytest.approx(stokes, rel=1e-7, abs=0.0)
+    assert back.dolp == pytest.approx(math.sqrt(2.0) * 1e-6, rel=1e-6)
+
+
 def test_unknown_errors_have_no_layer(picture, tmp_path):
     file = tmp_path / "p.exr"
     write_exr(StokesPicture(picture.stokes, np.full_like(picture.std, np.nan)), file)

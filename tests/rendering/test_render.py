@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scene_helpers import sees
 
 from pbrdf.errors import BackendError, PbrdfError
-from pbrdf.rendering.render import _pass_sizes, render_stokes
+from pbrdf.rendering.render import _has_sheets, _pass_sizes, render_stokes
 from pbrdf.rendering.scenes import Camera, make_scene, subject
 from pbrdf.rendering.variant import start_mitsuba
 
@@ -99,6 +99,67 @@ def test_angles_that_differ_by_half_a_turn_are_the_same_polariser(mitsuba):
     picture = sees({**LAMP, "sheet": sheet(mitsuba, 0.0, 20.0, {"type": "polarizer"})}, CAMERA)
     assert picture.through_polarizer(0.3) == pytest.approx(picture.through_polarizer(0.3 + math.pi))
     assert picture.through_polarizer(20.0 * DEG) == pytest.approx(picture.stokes[0], rel=1e-3)
+
+
+def behind_sheets(mi, bsdf, turn=None):
+    """A level plate, seen at Brewster's angle of n = 1.5, where it mirrors a lamp behind a polariser that is turned
+    counterclockwise for an observer who looks into the lamp; irradiance across the light 1 without it."""
+    zenith = math.atan(1.5)
+    toward = np.array([math.sin(zenith), 0.0, math.cos(zenith)])
+    T = mi.ScalarTransform4f
+    place = T().look_at(list(1.5 * toward), [0.0, 0.0, 0.0], [0.0, 0.0, 1.0])
+    entries = {
+        "plate": {"type": "rectangle", "bsdf": bsdf},
+        "lamp": {"type": "point", "position": list(3.0 * toward), "intensity": number(9.0)},
+    }
+    if turn is not None:
+        place = place @ T().rotate([0, 0, 1], turn) @ T().scale(2.0)
+        entries["sheet"] = {"type": "rectangle", "to_world": place, "bsdf": {"type": "polarizer"}}
+    camera = Camera((-3.0 * toward[0], 0.0, 3.0 * toward[2]), (0.0, 0.0, 0.0), 0.1 * DEG)
+    return middle(sees(entries, camera, spp=64, depth=2))
+
+
+def test_a_lamp_behind_a_polariser_lights_a_plate_with_half_its_irradiance(mitsuba):
+    """Mitsuba's `path` shows it black."""
+    white = {"type": "diffuse", "reflectance": number(1.0)}
+    radiance = math.cos(math.atan(1.5)) / math.pi
+    assert behind_sheets(mitsuba, white)[0] == pytest.approx(radiance, rel=1e-3)
+    for turn in (0.0, 25.0):
+        assert behind_sheets(mitsuba, white, turn) == pytest.approx(
+            [0.5 * radiance, 0, 0, 0], abs=1e-3 * radiance
+        )
+
+
+@pytest.mark.slow
+def test_its_light_is_polarised_where_it_falls(mitsuba):
+    """A coating at Brewster's angle sends back what is polarised across the plane of incidence alone: all that the bare
+    lamp's light gives, and nothing of light in that plane."""
+    coating = {"type": "pplastic", "alpha": 0.05, "int_ior": 1.5, "diffuse_reflectance": number(0.0)}
+    bare, level, upright, between = (
+        behind_sheets(mitsuba, coating, turn) for turn in (None, 0.0, 90.0, 30.0)
+    )
+    assert level == pytest.approx(bare, rel=1e-2, abs=1e-2 * bare[0])
+    assert abs(upright).max() < 1e-3 * bare[0]
+    assert between[0] == pytest.approx(math.cos(30.0 * DEG) ** 2 * level[0], rel=1e-2)
+
+
+@pytest.mark.parametrize(
+    ("bsdf", "straight"),
+    [
+        ({"type": "polarizer"}, True),
+        ({"type": "retarder"}, True),
+        ({"type": "circular"}, True),
+        ({"type": "null"}, True),
+        ({"type": "mask", "opacity": 0.5, "bsdf": {"type": "diffuse"}}, True),
+        ({"type": "thindielectric"}, True),
+        ({"type": "dielectric"}, False),
+        ({"type": "twosided", "bsdf": COAT}, False),
+    ],
+)
+def test_sheets_that_light_passes_straight_are_told_from_others(mitsuba, bsdf, straight):
+    """The others need no search for lamps behind them, which takes longer."""
+    shapes = {"ball": {"type": "sphere", "bsdf": COAT}, "sheet": {"type": "rectangle", "bsdf": bsdf}}
+    assert _has_sheets(mitsuba.load_dict({"type": "scene", **shapes})) == straight
 
 
 @pytest.mark.slow

@@ -91,7 +91,9 @@ _SUBJECTS: dict[str, str] = {
     **dict.fromkeys(
         ("out_of_plane", "camera_positions", "repeats", "smallest_bistatic", "largest_zenith"), _PLACES
     ),
-    **dict.fromkeys(("sun_zenith", "sun_azimuth", "max_dolp", "optical_depth"), _LIGHT),
+    **dict.fromkeys(
+        ("sun_zenith", "sun_azimuth", "lamp_polarizer", "lamp_retarder", "max_dolp", "optical_depth"), _LIGHT
+    ),
     **dict.fromkeys(("spp", "depth", "variant"), _TRACING),
     **dict.fromkeys(("seed", "backend", "max_memory", "quiet"), _RUN),
 }

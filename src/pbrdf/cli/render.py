@@ -19,6 +19,7 @@ from pbrdf.errors import PbrdfError
 if TYPE_CHECKING:
     from pbrdf.models import Model
     from pbrdf.rendering.picture import StokesPicture
+    from pbrdf.rendering.polarized_lamp import LampPolarization
 
 __all__ = ["render"]
 
@@ -65,6 +66,21 @@ def render(
             show_default="by scene",
             min=-360.0,
             max=360.0,
+        ),
+    ] = None,
+    lamp_polarizer: Annotated[
+        float | None,
+        typer.Option(
+            help="A polariser before the lamp, at this angle for who looks into it: 0 horizontal, counterclockwise.",
+            metavar="ANGLE",
+        ),
+    ] = None,
+    lamp_retarder: Annotated[
+        str | None,
+        typer.Option(
+            help="A retarder behind that polariser: its fast axis, counted alike, and its retardance. -45,90 behind a "
+            "polariser at 0: left circular.",
+            metavar="ANGLE,RETARDANCE",
         ),
     ] = None,
     max_dolp: Annotated[
@@ -124,6 +140,8 @@ def render(
         "--light": light,
         "--sun-zenith": sun_zenith,
         "--sun-azimuth": sun_azimuth,
+        "--lamp-polarizer": lamp_polarizer,
+        "--lamp-retarder": lamp_retarder,
         "--max-dolp": max_dolp,
         "--optical-depth": optical_depth,
     }
@@ -135,6 +153,7 @@ def render(
         raise PbrdfError(f"--{'max-dolp' if max_dolp is not None else 'optical-depth'} is for --light sky")
     if not _has_direction(lamp) and (sun_zenith is not None or sun_azimuth is not None):
         raise PbrdfError(f"--light {lamp} has no direction: leave --sun-zenith and --sun-azimuth out")
+    before_lamp = _before_lamp(lamp, lamp_polarizer, lamp_retarder)
     for angle in polarizer or ():
         if not math.isfinite(angle):
             raise PbrdfError("--polarizer: give an angle in degrees")
@@ -168,12 +187,16 @@ def render(
     mitsuba.set_log_level(mitsuba.LogLevel.Error)
     title = ", ".join(Path(source).name for source in sources) or Path(scene).name
     notes = {"models": title, "scene": scene, "light": lamp if own else "of the scene", "variant": variant}
+    if before_lamp is not None:
+        notes["before the lamp"] = str(before_lamp)
     pictures: list[StokesPicture] = []
     for place, nm in enumerate(colours):
         coats = [bsdf_dict(models_of_one[place]) for _, models_of_one in painted]
         if own:
             air = {"max_dolp": max_dolp, "optical_depth": optical_depth}
-            stage = _stage(scene, coats, lamp, shape or (512, 512), sun_zenith, sun_azimuth, air, nm)
+            stage = _stage(
+                scene, coats, lamp, before_lamp, shape or (512, 512), sun_zenith, sun_azimuth, air, nm
+            )
         else:
             stage = load_scene_file(Path(scene), coats, shape)
         at = "" if nm is None else f" at {nm:g} nm"
@@ -195,6 +218,27 @@ def render(
 def _has_direction(light: str) -> bool:
     """Whether a light of this name comes from somewhere."""
     return light != "constant" and not light.startswith("envmap:")
+
+
+def _before_lamp(light: str, polarizer: float | None, retarder: str | None) -> LampPolarization | None:
+    """What stands before the lamp."""
+    from pbrdf.rendering.lights import LAMPS
+    from pbrdf.rendering.polarized_lamp import LampPolarization
+
+    if polarizer is None:
+        if retarder is not None:
+            raise PbrdfError("--lamp-retarder: it does nothing to natural light; give --lamp-polarizer too")
+        return None
+    if light not in LAMPS:
+        raise PbrdfError(f"--lamp-polarizer is for --light {' or '.join(LAMPS)}")
+    if not math.isfinite(polarizer):
+        raise PbrdfError("--lamp-polarizer: give an angle in degrees")
+    angles = [] if retarder is None else [number(part, "--lamp-retarder") for part in retarder.split(",")]
+    if len(angles) not in (0, 2):
+        raise PbrdfError(
+            f"--lamp-retarder {retarder}: give the angle of its fast axis and its retardance, for example -45,90"
+        )
+    return LampPolarization(math.radians(polarizer), *map(math.radians, angles))
 
 
 def _wavelengths(text: str | None) -> list[float | None]:
@@ -244,6 +288,7 @@ def _stage(
     scene: str,
     coats: Sequence[Any],
     light: str,
+    before_lamp: LampPolarization | None,
     size: tuple[int, int],
     zenith: float | None,
     azimuth: float | None,
@@ -262,7 +307,7 @@ def _stage(
     sky = Sky(*direction, **{name: value for name, value in air.items() if value is not None})
     if wavelength is not None:
         sky = replace(sky, optical_depth=sky.optical_depth * (550.0 / wavelength) ** 4)
-    return make_scene(what, light, size, direction=direction, sky=sky)
+    return make_scene(what, light, size, direction=direction, sky=sky, polarization=before_lamp)
 
 
 def _write(picture: StokesPicture, target: Path, title: str, polarizers: list[float]) -> list[Path]:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from pbrdf.errors import PbrdfError
+from pbrdf.rendering.cameras import camera_scenes, picture_size
 from pbrdf.rendering.picture import StokesPicture
 
 __all__ = ["central_rays", "render_stokes"]
@@ -31,7 +32,7 @@ def render_stokes(
     seed: int = 0,
     progress: Callable[[int, int], None] | None = None,
 ) -> StokesPicture:
-    """Render the first camera of a scene by path tracing.
+    """Render the first camera of a scene by path tracing; the cameras of a ``batch`` side by side, each in its axes.
 
     The samples are taken in passes with different seeds; the spread of the passes gives the standard error of each
     pixel.
@@ -43,7 +44,8 @@ def render_stokes(
     spp
         Samples per pixel.
     depth
-        Longest path: 1 sees lights alone, 2 light that was reflected once; −1 sets no limit.
+        Longest path: 1 sees lights alone, 2 light that was reflected once; −1 sets no limit. Sheets that light passes
+        straight, such as Mitsuba's ``polarizer`` and ``retarder``, do not count.
     seed
         Another one gives another, independent picture.
     progress
@@ -57,40 +59,66 @@ def render_stokes(
     Raises
     ------
     PbrdfError
-        If the numbers are out of range, or Mitsuba cannot render the scene.
+        If the numbers are out of range, the scene's first sensor is no camera, or Mitsuba cannot render the scene.
     """
-    import mitsuba as mi
-
     if spp < 1 or depth < -1 or depth == 0 or seed < 0:
         raise PbrdfError(
             f"spp is {spp}, depth {depth}, seed {seed}: use 1 or more, 1 or more (or -1), 0 or more"
         )
-    columns, rows = (int(n) for n in scene.sensors()[0].film().crop_size())
+    cameras = camera_scenes(scene)
+    columns, rows = picture_size(scene)
     if rows * columns > _MOST_PIXELS:
         raise PbrdfError(f"{columns} × {rows} pixels are more than the {_MOST_PIXELS} allowed")
-    integrator = mi.load_dict({"type": "stokes", "nested": {"type": "path", "max_depth": depth}})
+    pictures = []
+    for i, camera in enumerate(cameras):
+
+        def of_all(done: int, passes: int, i: int = i) -> None:
+            if progress is not None and (done or not i):
+                progress(i * passes + done, len(cameras) * passes)
+
+        pictures.append(_render_camera(camera, spp, depth, seed * len(cameras) + i, of_all))
+    stokes, std, surface = (np.concatenate(parts, axis=-1) for parts in zip(*pictures, strict=True))
+    attrs = {"spp": float(spp), "depth": float(depth), "seed": float(seed)}
+    return StokesPicture(stokes, std, attrs, surface=surface)
+
+
+def _render_camera(
+    scene: Any, spp: int, depth: int, seed: int, progress: Callable[[int, int], None]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Stokes vectors, their standard errors and which pixels show a surface."""
+    import mitsuba as mi
+
+    columns, rows = picture_size(scene)
+    # `path` takes a sheet that light passes straight, a polariser for instance, for opaque when it looks for lamps
+    nested = "volpath" if _has_sheets(scene) else "path"
+    integrator = mi.load_dict({"type": "stokes", "nested": {"type": nested, "max_depth": depth}})
     spp = max(spp, -(-_FEWEST_SAMPLES // (rows * columns)))
     sizes = _pass_sizes(spp, rows * columns)
     mean = np.zeros((4, rows, columns))
     squares = np.zeros_like(mean)
     taken = 0
     for i, size in enumerate(sizes):
-        if progress is not None:
-            progress(i, len(sizes))
+        progress(i, len(sizes))
         stokes = _one_pass(scene, integrator, size, seed * len(sizes) + i)
         # Welford's update, weighted with the samples of the pass
         taken += size
         change = stokes - mean
         mean += change * (size / taken)
         squares += size * change * (stokes - mean)
-    if progress is not None:
-        progress(len(sizes), len(sizes))
+    progress(len(sizes), len(sizes))
     std = np.full_like(mean, np.nan)
     if len(sizes) > 1:
         std = np.sqrt(squares / (len(sizes) - 1) / taken)
-    surface = np.array(scene.ray_test(central_rays(scene))).reshape(rows, columns)
-    return StokesPicture(
-        mean, std, {"spp": float(spp), "depth": float(depth), "seed": float(seed)}, surface=surface
+    return mean, std, np.array(scene.ray_test(central_rays(scene))).reshape(rows, columns)
+
+
+def _has_sheets(scene: Any) -> bool:
+    """Whether light passes a surface of the scene straight: a polariser, a retarder, a mask, a thin pane."""
+    import mitsuba as mi
+
+    return any(
+        shape.bsdf() is not None and mi.has_flag(shape.bsdf().flags(), mi.BSDFFlags.Null)
+        for shape in scene.shapes()
     )
 
 
@@ -99,14 +127,13 @@ def central_rays(scene: Any) -> Any:
     import drjit as dr
     import mitsuba as mi
 
-    sensor = scene.sensors()[0]
-    columns, rows = (int(n) for n in sensor.film().crop_size())
+    columns, rows = picture_size(scene)
     index = dr.arange(mi.UInt32, rows * columns)
     centre = mi.Point2f(
         (mi.Float(index % columns) + 0.5) / columns,
         (mi.Float(index // columns) + 0.5) / rows,
     )
-    return sensor.sample_ray(0.0, 0.5, centre, mi.Point2f(0.5))[0]
+    return scene.sensors()[0].sample_ray(0.0, 0.5, centre, mi.Point2f(0.5))[0]
 
 
 def _pass_sizes(spp: int, pixels: int) -> list[int]:

@@ -15,6 +15,7 @@ from typing import Any
 
 from pbrdf.errors import PbrdfError
 from pbrdf.rendering.lights import light_dict
+from pbrdf.rendering.polarized_lamp import LampPolarization
 from pbrdf.rendering.sky import Sky, direction_of
 
 __all__ = ["SCENES", "Camera", "Subject", "load_scene_file", "make_scene", "subject"]
@@ -246,6 +247,7 @@ def make_scene(
     *,
     direction: tuple[float, float] | None = None,
     sky: Sky | None = None,
+    polarization: LampPolarization | None = None,
 ) -> Any:
     """A Mitsuba scene from a subject and a light.
 
@@ -261,11 +263,21 @@ def make_scene(
         Zenith angle and azimuth of the light, radians; that of the subject by default.
     sky
         The sky for the light ``sky``, sun included; `direction` is not looked at then.
+    polarization
+        What stands before a lamp, ``point`` or ``area``.
     """
     import mitsuba as mi
 
     zenith, azimuth = direction or what.light
-    lamp = light_dict(light, zenith=zenith, azimuth=azimuth, centre=what.centre, extent=what.extent, sky=sky)
+    lamp = light_dict(
+        light,
+        zenith=zenith,
+        azimuth=azimuth,
+        centre=what.centre,
+        extent=what.extent,
+        sky=sky,
+        polarization=polarization,
+    )
     return mi.load_dict(
         {"type": "scene", "sensor": what.camera.to_dict(*size), **what.entries, "light": lamp}
     )
@@ -346,7 +358,9 @@ def _size_film(state: Any, path: Path, size: tuple[int, int] | None) -> None:
     if size is not None:
         if not films:
             raise PbrdfError(f"{path}: the camera of this scene has no <film> to give the size to")
-        films[0].props["width"], films[0].props["height"] = size
+        # of every sensor: the first is the one that is rendered, and a batch gives its cameras their shares
+        for film in films:
+            film.props["width"], film.props["height"] = size
 
 
 def _one_line(error: Exception) -> str:

@@ -7,6 +7,7 @@ from typing import Any
 from pbrdf.errors import BackendError
 from pbrdf.rendering.bsdf import register
 from pbrdf.rendering.mitsuba_import import import_mitsuba
+from pbrdf.rendering.polarized_lamp import register_polarized_lamp
 from pbrdf.rendering.sky_emitter import register_sky
 
 __all__ = ["DEFAULT_VARIANT", "start_mitsuba"]
@@ -15,9 +16,10 @@ DEFAULT_VARIANT = "llvm_ad_mono_polarized"
 
 
 def start_mitsuba(variant: str = DEFAULT_VARIANT) -> Any:
-    """Import Mitsuba, make `variant` the active one and register the plugins ``pbrdf`` and ``pbrdf_sky``.
+    """Import Mitsuba, make `variant` the active one and register the plugins of this package.
 
-    Mitsuba's active variant is a setting of the whole process.
+    These are ``pbrdf``, ``pbrdf_sky`` and ``pbrdf_polarized``. Mitsuba's active variant is a setting of the whole
+    process.
 
     Parameters
     ----------
@@ -52,4 +54,5 @@ def start_mitsuba(variant: str = DEFAULT_VARIANT) -> Any:
         ) from error
     register()
     register_sky()
+    register_polarized_lamp()
     return mi

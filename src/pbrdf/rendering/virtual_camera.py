@@ -7,7 +7,7 @@ one picture holds a measurement of its BRDF.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,6 +20,7 @@ from pbrdf.instruments.pixel_geometry.geometry import MAX_ZENITH, plane_rotation
 from pbrdf.instruments.polarimeter.instrument import Instrument
 from pbrdf.instruments.reduction.stokes_image import StokesImage
 from pbrdf.instruments.reduction.surface_axes import to_surface_axes
+from pbrdf.rendering.cameras import camera_scenes, picture_size
 from pbrdf.rendering.picture import StokesPicture
 from pbrdf.rendering.render import central_rays
 
@@ -54,7 +55,7 @@ class PixelGeometry:
 
 
 def pixel_geometry(scene: Any, lamp: Sequence[float]) -> PixelGeometry:
-    """Geometry of each pixel of a scene's first camera under a small lamp.
+    """Geometry of each pixel of a scene's first camera under a small lamp; of a batch side by side, as in its picture.
 
     Parameters
     ----------
@@ -63,11 +64,18 @@ def pixel_geometry(scene: Any, lamp: Sequence[float]) -> PixelGeometry:
     lamp
         Position of the lamp, metres.
     """
+    parts = [_camera_geometry(camera, lamp) for camera in camera_scenes(scene)]
+    return PixelGeometry(
+        *(np.concatenate([getattr(part, f.name) for part in parts], axis=1) for f in fields(PixelGeometry))
+    )
+
+
+def _camera_geometry(scene: Any, lamp: Sequence[float]) -> PixelGeometry:
     import drjit as dr
     import mitsuba as mi
 
     sensor = scene.sensors()[0]
-    columns, rows = (int(n) for n in sensor.film().crop_size())
+    columns, rows = picture_size(scene)
     ray = central_rays(scene)
     si = scene.ray_intersect(ray)
     target = mi.Point3f([float(c) for c in lamp])
