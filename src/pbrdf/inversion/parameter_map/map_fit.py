@@ -22,6 +22,7 @@ from pbrdf.data.schema import (
 )
 from pbrdf.data.validation import validate
 from pbrdf.errors import DataError, FitError
+from pbrdf.inversion.held_values import Held
 from pbrdf.inversion.noise import Noise, parse_noise
 from pbrdf.inversion.nuisance import Nuisance
 from pbrdf.inversion.observations import Observations, noise_in_words
@@ -85,7 +86,7 @@ class MapFit:
         model: type[Model] | Model | str = DoubleGauss,
         *,
         options: Mapping[str, str] | None = None,
-        fix: Mapping[str, float] | None = None,
+        fix: Mapping[str, Held] | None = None,
         free: Sequence[str] = (),
         bounds: Mapping[str, tuple[float, float]] | None = None,
         start: Mapping[str, float] | None = None,
@@ -130,6 +131,11 @@ max_iterations, share, correlation
             covariance = np.asarray(covariance, dtype=float)
             like.with_covariance(covariance)
         space, begin = space_of(model, options or {}, fix or {}, free, bounds or {}, start or {}, like)
+        if space.by_wavelength:
+            raise FitError(
+                f"fix: {', '.join(space.by_wavelength)} differs between the wavelengths of the data, "
+                f"{', '.join(f'{one:g}' for one in space.wavelengths)} nm, and a map holds one: make a map of each"
+            )
         space = with_terms(space, like, priors or {}, {}, terms, bounds or {}, loss)
         share = [share] if isinstance(share, str) else list(dict.fromkeys(share))
         for name in share:
@@ -190,6 +196,7 @@ max_iterations, share, correlation
             "model": self.settings["model"],
             "options": self.settings["options"],
             "fixed": self.settings["fixed"],
+            **({"sources": dict(self.space.sources)} if self.space.sources else {}),
         }
         found = {
             "model": json.dumps(described, ensure_ascii=False),

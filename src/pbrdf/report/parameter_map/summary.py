@@ -278,7 +278,8 @@ def _model_in_words(attrs: Mapping[str, Any]) -> str:
     except (ValueError, KeyError, TypeError):
         return str(attrs.get("model", ""))
     options = [f"{option} = {choice}" for option, choice in described.get("options", {}).items()]
-    return f"{name} ({', '.join(options)})" if options else name
+    words = f"{name} ({', '.join(options)})" if options else name
+    return "; ".join([words, *described.get("sources", {}).values()])
 
 
 def counted(count: int) -> str:
