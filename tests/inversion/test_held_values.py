@@ -223,16 +223,19 @@ def test_a_fit_of_it_is_no_material_of_a_library(result):
 
 
 @pytest.mark.slow
-def test_a_map_holds_a_material_of_one_wavelength():
-    one, all_three = measured((550.0,)), measured()
-    for data in (one, all_three):
-        for c in ("I", "Q", "U", "I_std", "Q_std", "U_std"):
-            data[c] = data[c].expand_dims(x=2)
-    found = pbrdf.fit_map(one.transpose("geometry", ...), fix={**HELD, "n": "main/ink/both"}, starts=4)
-    assert json.loads(found.attrs["model"])["fixed"]["n"] == 1.52
-    assert "main/ink/both at 550 nm" in json.loads(found.attrs["model"])["sources"]["n"]
+@pytest.mark.parametrize("wavelengths", [(550.0,), tuple(DISPERSION)])
+def test_a_map(wavelengths):
+    image = measured(wavelengths)
+    for c in ("I", "Q", "U", "I_std", "Q_std", "U_std"):
+        image[c] = image[c].expand_dims(x=2, axis=1)
+    fix = {**HELD, "n": "main/ink/both", "a": {w: 0.001 * w for w in wavelengths}}
+    found = pbrdf.fit_map(image, fix=fix, starts=4)
     assert_allclose(found["estimate"].sel(parameter="sigma"), 0.08, rtol=1e-5)
-    with pytest.raises(
-        FitError, match=r"n, kappa differs between the wavelengths of the data, 450, 550, 650 nm"
-    ):
-        pbrdf.fit_map(all_three, fix={**HELD, "n": "main/ink/both"}, starts=4)
+    described = json.loads(found.attrs["model"])
+    assert "main/ink/both at" in described["sources"]["n"]
+    if len(wavelengths) == 1:
+        assert described["fixed"]["n"] == 1.52
+        assert "by_wavelength" not in described
+    else:
+        assert described["by_wavelength"]["n"] == [[w, n] for w, (n, _) in DISPERSION.items()]
+        assert json.loads(found.attrs["settings"])["by_wavelength"] == described["by_wavelength"]

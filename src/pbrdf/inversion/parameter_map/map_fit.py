@@ -131,11 +131,6 @@ max_iterations, share, correlation
             covariance = np.asarray(covariance, dtype=float)
             like.with_covariance(covariance)
         space, begin = space_of(model, options or {}, fix or {}, free, bounds or {}, start or {}, like)
-        if space.by_wavelength:
-            raise FitError(
-                f"fix: {', '.join(space.by_wavelength)} differs between the wavelengths of the data, "
-                f"{', '.join(f'{one:g}' for one in space.wavelengths)} nm, and a map holds one: make a map of each"
-            )
         space = with_terms(space, like, priors or {}, {}, terms, bounds or {}, loss)
         share = [share] if isinstance(share, str) else list(dict.fromkeys(share))
         for name in share:
@@ -154,6 +149,7 @@ max_iterations, share, correlation
             "model": space.model.name,
             "options": dict(shown.chosen),
             "fixed": dict(space.fixed),
+            **_by_wavelength(space),
             "free": space.names,
             "bounds": {name: [float(v) for v in pair] for name, pair in (bounds or {}).items()},
             "begin": begin,
@@ -196,8 +192,10 @@ max_iterations, share, correlation
             "model": self.settings["model"],
             "options": self.settings["options"],
             "fixed": self.settings["fixed"],
-            **({"sources": dict(self.space.sources)} if self.space.sources else {}),
+            **_by_wavelength(self.space),
         }
+        if self.space.sources:
+            described["sources"] = dict(self.space.sources)
         found = {
             "model": json.dumps(described, ensure_ascii=False),
             "settings": json.dumps(self.settings, ensure_ascii=False),
@@ -640,6 +638,12 @@ def _listed(dataset: xr.Dataset) -> str:
 def _in_memory(array: xr.DataArray) -> bool:
     """Whether a variable holds its values: small things beside the data are kept with the map, others not."""
     return isinstance(array.variable._data, np.ndarray)
+
+
+def _by_wavelength(space: Space) -> dict[str, Any]:
+    """What is held at a value of each wavelength, as JSON holds it; nothing where nothing is."""
+    held = {name: list(map(list, table.items())) for name, table in space.by_wavelength.items()}
+    return {"by_wavelength": held} if held else {}
 
 
 def _words(

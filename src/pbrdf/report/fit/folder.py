@@ -142,7 +142,7 @@ def fit_record(report: Report) -> dict[str, Any]:
         "model": result.model.to_dict(),
         "estimates": {name: _estimate(e) for name, e in result.estimates.items()},
         "held_by_wavelength": {
-            name: {f"{wavelength:g}": value * factor[name] for wavelength, value in table.items()}
+            name: {f"{wavelength:.10g}": value * factor[name] for wavelength, value in table.items()}
             for name, table in result.space.by_wavelength.items()
         },
         "correlation": {
