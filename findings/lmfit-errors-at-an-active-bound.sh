@@ -2,8 +2,8 @@
 # Library:   lmfit 1.3.4, Minimizer with the methods leastsq and least_squares.
 # Guess:     with a parameter on its bound both methods give the other parameters the standard errors of a fit in which
 #            that parameter is held there.
-# Behaviour: leastsq gives no standard error to any parameter (errorbars False, success True); least_squares gives errors
-#            as if the bound were not there: one to the parameter on it, and larger ones to those correlated with it.
+# Behaviour: leastsq gives no standard error to any parameter (errorbars False, success True); least_squares gives
+#            errors as if the bound were not there: one to the parameter on it, larger ones to those correlated with it.
 # Seen:      leastsq none; least_squares b +- 0.0620, c +- 0.0180 on its bound; c held: b +- 0.0385
 # Exit:      0 while the behaviour stands, 1 if it has changed.
 set -euo pipefail

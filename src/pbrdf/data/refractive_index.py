@@ -93,9 +93,9 @@ def refractive_index(
         try:
             low, high = (float(end) for end in material.get_wl_range(unit="nm", quantity=symbol))
         except Exception as error:  # the package has no class of its own for a page without n
-            if symbol == EXTINCTION:
+            if isinstance(error, package.NoExtinctionCoefficient):
                 continue
-            raise DataError(f"{name}: the page states no n") from error
+            raise DataError(f"{name}: the page states no {symbol}") from error
         outside = (wanted < low * (1.0 - _ROUNDING)) | (wanted > high * (1.0 + _ROUNDING))
         if outside.any():
             raise DataError(

@@ -76,7 +76,13 @@ def held_values(
     found = HeldValues()
     for name, given in fix.items():
         if not isinstance(given, str | Mapping):
-            found.fixed[name] = float(given)
+            try:
+                found.fixed[name] = float(given)
+            except TypeError:
+                raise FitError(
+                    f"fix: {name} is held at a number, numbers by wavelength as {{450: 1.52, 550: 1.51}}, or a page of "
+                    "refractiveindex.info"
+                ) from None
             continue
         wavelengths = _known(name, given, wavelength)
         if isinstance(given, str):
