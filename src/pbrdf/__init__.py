@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from pbrdf.data import check, convert, make_dataset, read, validate, write
     from pbrdf.data.paints import PAINTS, load_paint, open_experiment
     from pbrdf.data.readers import register_reader
+    from pbrdf.data.refractive_index import refractive_index
     from pbrdf.explorer.explore import explore
     from pbrdf.identification.class_map import identify_map
     from pbrdf.identification.identify import identify
@@ -106,6 +107,7 @@ _HOME = {
     "load_model": "pbrdf.models",
     "load_paint": "pbrdf.data.paints",
     "PAINTS": "pbrdf.data.paints",
+    "refractive_index": "pbrdf.data.refractive_index",
     # Stokes parameters and Mueller matrices
     "dop": "pbrdf.optics.stokes",
     "dolp": "pbrdf.optics.stokes",
@@ -274,6 +276,7 @@ __all__ = [
     "read_library",
     "reduce",
     "reduce_frames",
+    "refractive_index",
     "register",
     "register_bsdf",
     "register_reader",

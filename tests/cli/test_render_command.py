@@ -233,6 +233,7 @@ def test_a_fit_with_parameters_of_each_wavelength_paints_in_colour(tmp_path):
         0.6, theta_r, 0.0, quantity="brdf", I=stokes[:, 0], Q=stokes[:, 1], U=stokes[:, 2], wavelength=nm
     )
     held = {name: value for name, value in paint.values.items() if name != "a"}
+    held["n"] = {w: paint.values["n"] + (550.0 - w) / 1e6 for w in (450.0, 550.0, 650.0)}
     pbrdf.fit(ds, fix=held, split={"a": "wavelength"}, starts=2).save(tmp_path / "f")
     source = str(tmp_path / "f")
     ((name, models),) = painted_with([source], [450.0, 550.0, 650.0])
@@ -240,6 +241,7 @@ def test_a_fit_with_parameters_of_each_wavelength_paints_in_colour(tmp_path):
     np.testing.assert_allclose(
         [m.values["a"] / paint.values["a"] for m in models], [450 / 550, 1.0, 650 / 550], rtol=0.02
     )
+    assert [m.values["n"] for m in models] == list(held["n"].values())
     with pytest.raises(PbrdfError, match="has parameters at 450, 550, 650 nm"):
         painted_with([source], [470.0])
     # without a wavelength it stands for one model as before

@@ -186,6 +186,13 @@ def test_hostile_settings_are_refused_where_they_stand(settings, place):
     assert refused.value.place == place
 
 
+def test_of_values_of_each_wavelength_the_model_of_a_pixel_has_the_first():
+    found = parameter_map()
+    described = json.loads(found.attrs["model"])
+    found.attrs["model"] = json.dumps({**described, "by_wavelength": {"kappa": [[450.0, 0.1], [550.0, 0.2]]}})
+    assert maps.model_at(of(found, pixel=[2, 3]), Workspace()).values["kappa"] == 0.1
+
+
 def test_a_damaged_map_is_said_in_words():
     found = parameter_map()
     del found["status"].attrs["flag_meanings"]

@@ -9,7 +9,7 @@ import typer
 
 from pbrdf.cli.options import noise_option
 from pbrdf.cli.values import bounds as read_bounds
-from pbrdf.cli.values import numbers, pairs
+from pbrdf.cli.values import number, numbers, pairs
 
 if TYPE_CHECKING:
     from pbrdf.models import Model
@@ -46,7 +46,11 @@ ModelOptions = Annotated[
 
 Fix = Annotated[
     list[str] | None,
-    typer.Option(help="Hold a parameter, e.g. n=1.5 (repeatable).", metavar="NAME=VALUE"),
+    typer.Option(
+        help="Hold a parameter, e.g. n=1.5; an index also at that of a material, n=main/SiO2/Malitson: "
+        "SHELF/BOOK/PAGE of refractiveindex.info (repeatable).",
+        metavar="NAME=VALUE|MATERIAL",
+    ),
 ]
 
 Free = Annotated[
@@ -125,7 +129,10 @@ def fit_arguments(
     """
     return {
         "options": pairs(option or (), "--option", "shadowing=smith"),
-        "fix": numbers(fix or (), "--fix", "n=1.5"),
+        "fix": {
+            name: text if "/" in text else number(text, f"--fix {name}")
+            for name, text in pairs(fix or (), "--fix", "n=1.5").items()
+        },
         "free": list(free or ()),
         "bounds": read_bounds(bounds or (), "--bounds", "sigma=0.01:0.2"),
         "start": numbers(start or (), "--start", "n=1.6"),

@@ -111,7 +111,7 @@ def painted_with(
 
 
 def _fitted_at(source: str, wavelengths: Sequence[float | None]) -> list[Model] | None:
-    """The models that a fit with parameters of each wavelength found; None if the source is no such fit."""
+    """The models of a fit with parameters free or held for each wavelength; None if the source is no such fit."""
     from pbrdf.inversion.stored_result import FILE_NAME
 
     folder = Path(source)
@@ -120,7 +120,7 @@ def _fitted_at(source: str, wavelengths: Sequence[float | None]) -> list[Model] 
     from pbrdf.inversion.stored_result import load_fit
 
     result = load_fit(folder)
-    known = result.space.labels("wavelength")
+    known = result.space.wavelengths
     if not known:
         return None
     values = [result.estimates[name].value for name in result.space.names]

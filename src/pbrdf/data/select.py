@@ -14,7 +14,7 @@ from pbrdf.data.schema import COVARIANCE, NORMALISED, VARIABLES, std_name, varia
 from pbrdf.errors import DataError
 from pbrdf.optics.stokes import STOKES
 
-__all__ = ["match_wavelengths", "measured_channels", "to_brdf_scale"]
+__all__ = ["WAVELENGTH_TOLERANCE", "match_wavelengths", "measured_channels", "to_brdf_scale"]
 
 #: Half the width within which a wavelength that was asked for meets one that was measured, nm.
 WAVELENGTH_TOLERANCE = 0.5

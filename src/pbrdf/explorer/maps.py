@@ -494,6 +494,8 @@ def model_at(chosen: ChosenMap, workspace: Workspace) -> Model:
     estimates = dict(zip(names, found["estimate"].values.tolist(), strict=True))
     values = {p.name: p.default for p in kind.parameters}
     values |= {n: float(v) for n, v in described.get("fixed", {}).items() if n in values}
+    # of those that are held at a value of each wavelength the first, as the model of a fit
+    values |= {n: table[0][1] for n, table in described.get("by_wavelength", {}).items() if n in values}
     values |= {n: v for n, v in estimates.items() if n in values}
     if not all(map(math.isfinite, values.values())):
         raise PbrdfError("this pixel has no result: there is no model to show")

@@ -232,7 +232,7 @@ def material_from_fits(
     free = tuple(first.free[i] for i in kept)
     for label, fit in zip(called, fits, strict=True):
         space = fit.space
-        if any(term.split is not None and not term.nuisance for term in space.terms):
+        if space.by_wavelength or any(term.split is not None and not term.nuisance for term in space.terms):
             raise FitError(f"material {name}: {label} has parameters of their own for groups or wavelengths")
         if not fit.settled:
             raise FitError(f"material {name}: {label} stands at no minimum: fit again with more starts")

@@ -30,7 +30,8 @@ class Estimate:
     std
         Standard error; NaN where it means nothing (fixed, on a bound, undetermined).
     lower, upper
-        Bounds that the fit kept.
+        Bounds that the fit kept; least and largest value of what was held at one of each wavelength, of which `value`
+        is the first.
     verdict
         ``"determined"``, ``"undetermined"`` (the data tell no more than the bounds), ``"at lower bound"``,
         ``"at upper bound"``, ``"fixed"``, or ``"not converged"`` where the fit stands at no minimum.
@@ -100,6 +101,10 @@ def estimates_at(
         for p in space.model.parameters
         if (value := space.fixed.get(p.name)) is not None
     }
+    for p in space.model.parameters:
+        if table := space.by_wavelength.get(p.name):
+            held = list(table.values())
+            estimates[p.name] = Estimate(p, held[0], math.nan, min(held), max(held), "fixed")
     for i, p in enumerate(space.free):
         std = float(error[i] * slope[i])
         if not solution.converged[best]:

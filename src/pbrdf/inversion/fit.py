@@ -14,6 +14,7 @@ from pbrdf.data.validation import validate
 from pbrdf.errors import FitError
 from pbrdf.inversion.comparison import compare, near_specular_tilt
 from pbrdf.inversion.estimates import distinct_optima, estimates_at
+from pbrdf.inversion.held_values import Held
 from pbrdf.inversion.holdout import HoldOut, Prediction, prediction_errors
 from pbrdf.inversion.noise import Noise, parse_noise
 from pbrdf.inversion.notes import notes_on
@@ -42,7 +43,7 @@ def fit(
     model: type[Model] | Model | str = DoubleGauss,
     *,
     options: Mapping[str, str] | None = None,
-    fix: Mapping[str, float] | None = None,
+    fix: Mapping[str, Held] | None = None,
     free: Sequence[str] = (),
     bounds: Mapping[str, tuple[float, float]] | None = None,
     start: Mapping[str, float] | None = None,
@@ -77,7 +78,9 @@ def fit(
     options
         Options of the model by name, for example ``{"shadowing": "smith"}``.
     fix
-        Parameters held at a value.
+        Parameters held at a value; or at a value of each wavelength in nm, ``{"n": {450: 1.52, 550: 1.51}}``. An index
+        can be that of a material, ``{"n": "main/SiO2/Malitson"}``: n and k of a page of refractiveindex.info at the
+        wavelengths of the data.
     free
         Parameters to fit that are held by default (``"kappa"``).
     bounds
@@ -146,7 +149,9 @@ def fit(
         observations = bare.with_covariance(np.asarray(covariance))
     held = hold_out.mask(dataset, seed) if hold_out else np.zeros(observations.values.shape[1], dtype=bool)
     fitted_data = observations.subset(~held) if held.any() else observations
-    space, begin = space_of(model, options or {}, fix or {}, free, bounds or {}, start or {}, fitted_data)
+    space, begin = space_of(
+        model, options or {}, fix or {}, free, bounds or {}, start or {}, fitted_data, observations.wavelength
+    )
     space = with_terms(space, fitted_data, priors or {}, split or {}, nuisances, bounds or {}, loss)
     if fitted_data.count <= len(space.free):
         raise FitError(

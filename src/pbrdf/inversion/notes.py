@@ -20,7 +20,7 @@ def notes_on(
     result: FitResult, dataset: xr.Dataset, data: Observations, solution: Solution, best: int
 ) -> list[str]:
     """Sentences on a fit: ``best`` is the number of its best start, ``data`` what was fitted."""
-    notes = []
+    notes = list(result.space.sources.values())
     if "wavelength" in dataset.coords:
         wavelengths = np.unique(dataset["wavelength"].values)
         by_wavelength = any(term.split == "wavelength" for term in result.space.terms)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Any
 
@@ -67,13 +67,17 @@ class Space:
         The free parameters: the model's in its order, then nuisance terms. A parameter that is free for each
         group or wavelength stands here once for each, as ``a[550]``.
     fixed
-        Values of all other parameters of the model by name.
+        Values of the parameters of the model that are held, by name.
     lower, upper
         Bounds of the free parameters, in their own units, shape (P,).
     terms
         What each free parameter stands for; empty where each is a parameter of the model for all data.
     loss
         Loss of the residuals, see :data:`pbrdf.inversion.solver.LOSSES`.
+    by_wavelength
+        Parameters that are held at a value of each wavelength: by name, values by wavelength in nm.
+    sources
+        Where held values come from, if not from the user or a default: sentences by name.
     """
 
     model: type[Model]
@@ -84,6 +88,8 @@ class Space:
     upper: np.ndarray
     terms: tuple[Term, ...] = ()
     loss: str = "linear"
+    by_wavelength: Mapping[str, Mapping[float, float]] = field(default_factory=dict)
+    sources: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not self.terms:
@@ -132,13 +138,22 @@ class Space:
     def build(self, values: Sequence[float] | np.ndarray, label: Any = None) -> Model:
         """The model with the free parameters set to ``values``.
 
-        Where a parameter is free for each group or wavelength, that of ``label`` counts, or the first.
+        Where a parameter is free for each group or wavelength, or held at a value of each, that of ``label`` counts, or
+        the first.
         """
-        named: dict[str, float] = {}
+        named = {
+            name: table.get(label, next(iter(table.values()))) for name, table in self.by_wavelength.items()
+        }
         for term, value in zip(self.terms, values, strict=True):
             if not term.nuisance and (term.role not in named or term.label == label):
                 named[term.role] = float(value)
         return self.model.from_values({**self.fixed, **named}, **self.options)
+
+    @property
+    def wavelengths(self) -> list[Any]:
+        """The wavelengths that have a model of their own, by what is free or held for each; none where all share it."""
+        held = next(iter(self.by_wavelength.values()), {})
+        return self.labels("wavelength") or list(held)
 
     def labels(self, split: str) -> list[Any]:
         """The groups or wavelengths that have unknowns of their own."""
@@ -387,6 +402,10 @@ class _Signals:
         self.model = model if accuracy is None else model.with_accuracy(accuracy)
         self.fixed = {name: dr.opaque(self.Float, value) for name, value in space.fixed.items()}
         self.absent = [p.name for p in model.parameters if p.vanishing and space.fixed.get(p.name) == 0.0]
+        self.held = {
+            name: backend.upload(self.Float, _at_wavelengths(name, table, stack))
+            for name, table in space.by_wavelength.items()
+        }
         # arrays over the geometries and data sets: where these share them, one number for all
         width = stack.theta_i.shape[1]
         self.stride, self.step = dr.opaque(self.UInt32, width), dr.opaque(self.UInt32, int(width > 1))
@@ -412,6 +431,7 @@ class _Signals:
         import drjit as dr
 
         values: dict[str, Any] = dict(self.fixed)
+        values |= {name: dr.gather(self.Float, column, point) for name, column in self.held.items()}
         nuisances: dict[str, Any] = {}
         shared: dict[tuple[bool, str], list[Any]] = {}
         for term, unknown in zip(self.space.terms, u, strict=True):
@@ -449,6 +469,17 @@ def _value(p: Parameter, unknown: Any) -> Any:
     if p.logarithmic:
         return dr.exp(unknown)
     return dr.sqrt(unknown + _POINT * _POINT) if p.even else unknown
+
+
+def _at_wavelengths(name: str, table: Mapping[float, float], stack: Stack) -> np.ndarray:
+    """The value of each geometry, of a parameter that is held at one of each wavelength."""
+    known = np.full(stack.points, np.nan) if stack.wavelength is None else stack.wavelength
+    missing = ~np.isin(known, list(table))
+    if missing.any():
+        raise FitError(
+            f"{name} is held at values of {len(table)} wavelengths; {known[missing][0]:g} nm is none of them"
+        )
+    return np.array([table[float(wavelength)] for wavelength in known])
 
 
 def _label_index(stack: Stack, split: str, labels: list[Any]) -> np.ndarray:

@@ -169,6 +169,8 @@ def _record(result: FitResult) -> dict[str, Any]:
             "upper": space.upper.tolist(),
             "terms": [{**asdict(t), "label": _plain(t.label)} for t in space.terms],
             "loss": space.loss,
+            "by_wavelength": {name: list(table.items()) for name, table in space.by_wavelength.items()},
+            "sources": dict(space.sources),
         },
         "observations": {
             "channels": list(result.data.channels),
@@ -214,6 +216,8 @@ def _result(
         upper=np.array(described["upper"]),
         terms=tuple(Term(**{**t, "prior": _pair(t["prior"])}) for t in described["terms"]),
         loss=described["loss"],
+        by_wavelength={name: dict(table) for name, table in described.get("by_wavelength", {}).items()},
+        sources=described.get("sources", {}),
     )
     observed = record["observations"]
     columns: dict[str, Any] = {name: arrays[name].values if name in arrays else None for name in _OBSERVED}

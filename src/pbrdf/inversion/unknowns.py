@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from pbrdf.data.schema import is_ratio
 from pbrdf.errors import FitError
+from pbrdf.inversion.held_values import Held, held_values, in_words
 from pbrdf.inversion.nuisance import KINDS, Nuisance, check_prior
 from pbrdf.inversion.observations import Observations
 from pbrdf.inversion.problem import Space, Term
@@ -38,13 +39,17 @@ def check_choices(starts: int, loss: str, objective: str) -> None:
 def space_of(
     model: type[Model] | Model | str,
     options: Mapping[str, str],
-    fix: Mapping[str, float],
+    fix: Mapping[str, Held],
     free: Sequence[str],
     bounds: Mapping[str, tuple[float, float]],
     start: Mapping[str, float],
     data: Observations,
+    wavelength: np.ndarray | None = None,
 ) -> tuple[Space, dict[str, float]]:
-    """Free and fixed parameters with their bounds, and the starting values of a given model."""
+    """Free and fixed parameters with their bounds, and the starting values of a given model.
+
+    ``wavelength`` is that of each geometry, shape (G,), of those too that are held out of ``data``.
+    """
     begin: dict[str, float] = {}
     chosen = dict(options)
     if isinstance(model, Model):
@@ -66,11 +71,11 @@ def space_of(
             if name not in names:
                 raise FitError(f"{what}: {cls.name} has no parameter {name!r}; it has {', '.join(names)}")
             if what != "fix" and name in fix:
-                raise FitError(f"{what}: the parameter {name} is fixed at {fix[name]:g}")
-    free_parameters, fixed, lower, upper = [], {}, [], []
+                raise FitError(f"{what}: the parameter {name} is fixed at {in_words(fix[name])}")
+    held = held_values(cls, fix, data.wavelength if wavelength is None else wavelength, {*free, *bounds})
+    free_parameters, fixed, lower, upper = [], dict(held.fixed), [], []
     for p in cls.parameters:
-        if p.name in fix:
-            fixed[p.name] = float(fix[p.name])
+        if p.name in held.fixed or p.name in held.by_wavelength:
             continue
         if not (p.fitted or p.name in free or p.name in bounds):
             fixed[p.name] = begin.get(p.name, p.default)
@@ -84,9 +89,21 @@ def space_of(
         upper.append(high)
     if not free_parameters:
         raise FitError("every parameter is fixed: nothing is left to fit")
-    space = Space(cls, chosen, tuple(free_parameters), fixed, np.array(lower), np.array(upper))
-    space.build(space.lower)  # raises ModelError for a fixed value or a bound outside the model's domain
-    space.build(space.upper)
+    space = Space(
+        cls,
+        chosen,
+        tuple(free_parameters),
+        {p.name: fixed[p.name] for p in cls.parameters if p.name in fixed},
+        np.array(lower),
+        np.array(upper),
+        by_wavelength=held.by_wavelength,
+        sources=held.sources,
+    )
+    for label in space.wavelengths or [None]:
+        space.build(
+            space.lower, label
+        )  # raises ModelError for a fixed value or a bound outside the model's domain
+        space.build(space.upper, label)
     return space, begin
 
 

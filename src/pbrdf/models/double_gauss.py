@@ -62,7 +62,7 @@ SLOPE = Parameter(
 )  # fmt: skip
 INDEX = Parameter(
     "n", "n", "1", "real refractive index of the coating",
-    1.2, 2.6, (0.01, 100.0), 1.6, part="specular",
+    1.2, 2.6, (0.01, 100.0), 1.6, part="specular", refractive_index=True,
 )  # fmt: skip
 EXTINCTION = Parameter(
     "kappa", "κ", "1", "extinction of the coating's index n − iκ, 0 for a dielectric",

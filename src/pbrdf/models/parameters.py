@@ -41,6 +41,8 @@ class Parameter:
         Whether it is a factor on the data's own scale: a fit takes its bounds from the data.
     vanishing
         Whether the kernel takes None for it where it is 0 everywhere, and leaves out what depends on it.
+    refractive_index
+        Whether it is the real refractive index of a material: a fit takes it from a page of optical constants.
     extinction_of
         Name of the refractive index n whose extinction κ it is: a complex n − iκ given for that one is split into both.
     """
@@ -59,6 +61,7 @@ class Parameter:
     part: Literal["specular", "diffuse", "both"] = "both"
     amplitude: bool = False
     vanishing: bool = False
+    refractive_index: bool = False
     extinction_of: str | None = None
 
     def shown(self, value: float, form: str = ".4g") -> str:

@@ -88,7 +88,8 @@ def test_a_narrow_terminal_gets_a_narrow_table(report):
         ("b", {"value": 0.01, "std": 0.02, "verdict": "determined"}, "determined to ±0.02"),
         ("t", {"verdict": "undetermined"}, "not determined by these data"),
         ("t", {"verdict": "at upper bound"}, "at its upper bound"),
-        ("n", {"verdict": "fixed"}, "fixed"),
+        ("n", {"verdict": "fixed", "lower": 1.6, "upper": 1.6}, "fixed"),
+        ("n", {"verdict": "fixed", "lower": 1.5, "upper": 1.6}, "fixed at each wavelength"),
     ],
 )
 def test_verdicts_in_words(report, name, changes, words):

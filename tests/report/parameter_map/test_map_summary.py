@@ -1,6 +1,7 @@
 """A map in numbers and sentences."""
 
 import io
+import json
 
 import numpy as np
 import pytest
@@ -100,6 +101,17 @@ def test_what_is_printed_fits_a_narrow_terminal():
     print_map(summary_of(example_map((30, 30))), printing_console(file=text, width=110))
     assert "χ² per degree of freedom: median" in text.getvalue()
     assert max(map(len, text.getvalue().splitlines())) <= 110
+
+
+def test_what_an_index_is_held_at_is_told():
+    found = example_map((30, 30))
+    assert summary_of(found).held == ()
+    described = {"model": "double-gauss", "sources": {"n": "n is held at 1.46, that of a page."}}
+    summary = summary_of(found.assign_attrs(model=json.dumps(described)))
+    text = io.StringIO()
+    print_map(summary, printing_console(file=text, width=110))
+    assert summary.held == ("n is held at 1.46, that of a page.",)
+    assert summary.held[0] in text.getvalue()
 
 
 def test_medians_by_part():

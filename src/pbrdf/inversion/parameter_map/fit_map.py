@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from pbrdf.data.schema import DIMENSION, VARIABLES, std_name
 from pbrdf.errors import DataError
+from pbrdf.inversion.held_values import Held
 from pbrdf.inversion.noise import Noise
 from pbrdf.inversion.nuisance import Nuisance
 from pbrdf.inversion.parameter_map.layout import PixelStatus
@@ -36,7 +37,7 @@ def fit_map(
     model: type[Model] | Model | str = DoubleGauss,
     *,
     options: Mapping[str, str] | None = None,
-    fix: Mapping[str, float] | None = None,
+    fix: Mapping[str, Held] | None = None,
     free: Sequence[str] = (),
     bounds: Mapping[str, tuple[float, float]] | None = None,
     start: Mapping[str, float] | None = None,

@@ -22,6 +22,7 @@ from pbrdf.data.schema import (
 )
 from pbrdf.data.validation import validate
 from pbrdf.errors import DataError, FitError
+from pbrdf.inversion.held_values import Held
 from pbrdf.inversion.noise import Noise, parse_noise
 from pbrdf.inversion.nuisance import Nuisance
 from pbrdf.inversion.observations import Observations, noise_in_words
@@ -85,7 +86,7 @@ class MapFit:
         model: type[Model] | Model | str = DoubleGauss,
         *,
         options: Mapping[str, str] | None = None,
-        fix: Mapping[str, float] | None = None,
+        fix: Mapping[str, Held] | None = None,
         free: Sequence[str] = (),
         bounds: Mapping[str, tuple[float, float]] | None = None,
         start: Mapping[str, float] | None = None,
@@ -148,6 +149,7 @@ max_iterations, share, correlation
             "model": space.model.name,
             "options": dict(shown.chosen),
             "fixed": dict(space.fixed),
+            **_by_wavelength(space),
             "free": space.names,
             "bounds": {name: [float(v) for v in pair] for name, pair in (bounds or {}).items()},
             "begin": begin,
@@ -190,7 +192,10 @@ max_iterations, share, correlation
             "model": self.settings["model"],
             "options": self.settings["options"],
             "fixed": self.settings["fixed"],
+            **_by_wavelength(self.space),
         }
+        if self.space.sources:
+            described["sources"] = dict(self.space.sources)
         found = {
             "model": json.dumps(described, ensure_ascii=False),
             "settings": json.dumps(self.settings, ensure_ascii=False),
@@ -633,6 +638,12 @@ def _listed(dataset: xr.Dataset) -> str:
 def _in_memory(array: xr.DataArray) -> bool:
     """Whether a variable holds its values: small things beside the data are kept with the map, others not."""
     return isinstance(array.variable._data, np.ndarray)
+
+
+def _by_wavelength(space: Space) -> dict[str, Any]:
+    """What is held at a value of each wavelength, as JSON holds it; nothing where nothing is."""
+    held = {name: list(map(list, table.items())) for name, table in space.by_wavelength.items()}
+    return {"by_wavelength": held} if held else {}
 
 
 def _words(

@@ -30,7 +30,7 @@ _INFINITY = float("inf")
 #: Index of a dielectric coating whose facets reflect and through whose flat surface body light passes.
 COATING_INDEX = Parameter(
     "n", "n", "1", "real refractive index of the coating",
-    1.2, 2.6, (1.0, 100.0), 1.5, part="both",
+    1.2, 2.6, (1.0, 100.0), 1.5, part="both", refractive_index=True,
 )  # fmt: skip
 
 

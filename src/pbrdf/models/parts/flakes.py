@@ -83,7 +83,7 @@ _FILM = (
     ),
     Parameter(
         "film_n", "n_f", "1", "refractive index of the film on the flakes (magnesium fluoride's unless given)",
-        1.2, 2.6, (1.0, 10.0), 1.38, fitted=False, part="specular",
+        1.2, 2.6, (1.0, 10.0), 1.38, fitted=False, part="specular", refractive_index=True,
     ),
 )  # fmt: skip
 

@@ -141,6 +141,10 @@ def fit_record(report: Report) -> dict[str, Any]:
         "verdict": verdict_record(result.verdict()),
         "model": result.model.to_dict(),
         "estimates": {name: _estimate(e) for name, e in result.estimates.items()},
+        "held_by_wavelength": {
+            name: {f"{wavelength:.10g}": value * factor[name] for wavelength, value in table.items()}
+            for name, table in result.space.by_wavelength.items()
+        },
         "correlation": {
             "parameters": [str(n) for n in result.correlation["parameter"].values],
             "matrix": result.correlation.values,

@@ -20,9 +20,10 @@ from pbrdf.report.fit.summary import (
     correlation_in_words,
     goodness_in_words,
     optima_in_words,
+    value_in_words,
     verdict_in_words,
 )
-from pbrdf.report.numbers import brief, per_cent, with_error
+from pbrdf.report.numbers import brief, per_cent
 from pbrdf.report.page import (
     Section,
     bullets,
@@ -116,6 +117,8 @@ def _fitted(report: Report, verdict: Verdict) -> Iterator[Markup]:
         ("Fitted to", [f"{total - held} of {total} geometries, {result.goodness.data} measured values"]),
         ("Noise", [result.noise]),
     ]
+    if sources := list(result.space.sources.values()):
+        rows.append(("Held", sources))
     if len(result.stages) > 1:
         rows.append(("Steps", [f"{stage.name}: {stage.points} geometries" for stage in result.stages]))
     rows.append(("Goodness", goodness_in_words(result)))
@@ -129,14 +132,12 @@ def _parameter_table(report: Report, verdict: Verdict) -> Markup:
     for e in report.result.estimates.values():
         p = e.parameter
         factor, unit = shown_unit(p)
-        value = with_error(factor * e.value, factor * e.std)
-        if e.verdict == "undetermined":
-            value = f"({brief(factor * e.value, 3)})"
         limits = (
             "" if e.verdict == "fixed" else f"{brief(factor * e.lower, 3)} … {brief(factor * e.upper, 3)}"
         )
         label = p.name if p.symbol == p.name else f"{p.symbol} ({p.name})"
-        rows.append([label, p.description, value, unit, limits, verdict_in_words(e, described=described)])
+        words = verdict_in_words(e, described=described)
+        rows.append([label, p.description, value_in_words(e), unit, limits, words])
         sure = "" if described else "doubtful"
         classes.append({"determined": sure, "fixed": "fixed"}.get(e.verdict, "doubtful"))
     return table(

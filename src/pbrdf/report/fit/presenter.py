@@ -16,8 +16,8 @@ from pbrdf.report.fit.checks import run_checks
 from pbrdf.report.fit.figure import fit_figure
 from pbrdf.report.fit.folder import parse_formats, write_report
 from pbrdf.report.fit.subject import Report
-from pbrdf.report.fit.summary import summary_text, verdict_in_words
-from pbrdf.report.numbers import brief, per_cent, with_error
+from pbrdf.report.fit.summary import summary_text, value_in_words, verdict_in_words
+from pbrdf.report.numbers import brief, per_cent
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -83,10 +83,10 @@ def _errors(what: str, by_region: dict[str, Prediction]) -> list[str]:
 
 
 def _row(name: str, estimate: Estimate, described: bool) -> str:
-    factor, unit = shown_unit(estimate.parameter)
+    _, unit = shown_unit(estimate.parameter)
     cells = (
         name,
-        with_error(factor * estimate.value, factor * estimate.std),
+        value_in_words(estimate),
         unit,
         verdict_in_words(estimate, described=described),
         estimate.parameter.description,

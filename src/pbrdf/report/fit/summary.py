@@ -37,6 +37,7 @@ __all__ = [
     "optima_in_words",
     "print_summary",
     "summary_text",
+    "value_in_words",
     "verdict_in_words",
 ]
 
@@ -268,13 +269,21 @@ def _parameter_table(result: FitResult, wide: bool, of: Verdict) -> Table:
         )
         meaning = [p.description.partition(",")[0]] if wide else []
         style = {"determined": "green", "fixed": "dim"}.get(e.verdict, "yellow")
-        value = with_error(factor * e.value, factor * e.std)
-        if e.verdict == "undetermined":
-            value = f"({brief(factor * e.value, 3)})"
         described = of.level.usable
         verdict = Text(verdict_in_words(e, described=described), style=style if described else "yellow")
-        table.add_row(label, *meaning, value, unit, limits, verdict)
+        table.add_row(label, *meaning, value_in_words(e), unit, limits, verdict)
     return table
+
+
+def value_in_words(estimate: Estimate) -> str:
+    """A value with its standard error, in the unit that people see; in brackets where the data do not determine it."""
+    e = estimate
+    factor, _ = shown_unit(e.parameter)
+    if e.verdict == "undetermined":
+        return f"({brief(factor * e.value, 3)})"
+    if e.verdict == "fixed" and e.lower < e.upper:
+        return f"{brief(factor * e.lower)} … {brief(factor * e.upper)}"
+    return with_error(factor * e.value, factor * e.std)
 
 
 def verdict_in_words(estimate: Estimate, *, described: bool = True) -> str:
@@ -291,6 +300,8 @@ def verdict_in_words(estimate: Estimate, *, described: bool = True) -> str:
         return "not determined by these data"
     if estimate.verdict.startswith("at "):
         return f"at its {estimate.verdict.removeprefix('at ')}"
+    if estimate.verdict == "fixed" and estimate.lower < estimate.upper:
+        return "fixed at each wavelength"
     if estimate.verdict in ("fixed", "not converged"):
         return estimate.verdict
     if not described:

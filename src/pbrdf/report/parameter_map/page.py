@@ -133,6 +133,8 @@ def _repeat(report: MapReport, summary: MapSummary, files: Sequence[str]) -> Ite
     if report.command:
         yield command(report.command)
     rows: list[tuple[str, Sequence[str]]] = [("Model", [summary.model])]
+    if summary.held:
+        rows.append(("Held", summary.held))
     if report.sources:
         rows.append(("Data", list(report.sources)))
     rows.append(("Versions", [versions(_PACKAGES)]))

@@ -107,6 +107,8 @@ class MapSummary:
         Numbers of pixels.
     model, noise
         In words.
+    held
+        Sentences on held values that are a material's.
     parts
         Of the sample, in the order of their labels; empty without labels.
     """
@@ -120,6 +122,7 @@ class MapSummary:
     total: int
     model: str
     noise: str
+    held: tuple[str, ...] = ()
     parts: tuple[PartSummary, ...] = ()
 
     @classmethod
@@ -139,6 +142,7 @@ class MapSummary:
             shown=shown.status.size,
             total=dataset["status"].size,
             model=_model_in_words(dataset.attrs),
+            held=_held(dataset.attrs),
             noise=str(dataset.attrs.get("noise", "")),
             parts=() if labels is None else tuple(_parts_of(shown, labels)),
         )
@@ -281,6 +285,13 @@ def _model_in_words(attrs: Mapping[str, Any]) -> str:
     return f"{name} ({', '.join(options)})" if options else name
 
 
+def _held(attrs: Mapping[str, Any]) -> tuple[str, ...]:
+    try:
+        return tuple(map(str, json.loads(str(attrs["model"]))["sources"].values()))
+    except (ValueError, KeyError, TypeError, AttributeError):
+        return ()
+
+
 def counted(count: int) -> str:
     """A count with its thousands apart."""
     return f"{count:,}".replace(",", " ")
@@ -342,6 +353,7 @@ def _parts(summary: MapSummary) -> Iterator[RenderableType]:
     for row in parameter_rows(summary):
         table.add_row(*row)
     yield table
+    yield from summary.held
     if summary.parts:
         parts = plain_table("medians by part of the sample", *part_headings(summary))
         for row in part_rows(summary):
