@@ -149,6 +149,8 @@ def test_azimuths_carry_the_camera_about_the_normal():
         degrees(turned.phi) - np.tile(degrees(flat.phi), 2), [0.0, 0.0, 30.0, 30.0], atol=1e-9
     )
     assert turned.laboratory == "level"
+    # what rounding leaves below 0 is no whole turn
+    assert (flat.at_azimuths(-1e-17).phi == flat.phi).all()
 
 
 # How the camera is held
