@@ -65,7 +65,7 @@ def from_pypolar_mueller(mueller: ArrayLike) -> NDArray[np.float64]:
     """Mueller matrices of pypolar, elements and reflection at a surface: V > 0 is right circular there.
 
     Frames (Q > 0 along p) and the index n − iκ are ours. ``op_fresnel_transmission`` is of fields: multiply it with
-    Re(n cosθ_t)/cosθ_i to have the flux.
+    Re(n cosθ_t)/cosθ_i to have the flux into a dielectric.
     """
     return mueller_flip_v(_mueller(mueller))
 
