@@ -73,8 +73,9 @@ def compare_with(
         raise PbrdfError("give either OURS or --flat N,KAPPA: what the matrices are compared with")
     theirs = _array(file)
     where = _directions(ours, theta_i, theta_r, phi)
-    _refuse_another_order(theirs.shape[:-2], where)
     matrices = _ours(ours, flat, where)
+    if theirs.shape[-2:] == (4, 4) and where:
+        _refuse_another_grid(theirs.shape[:-2], where)
     found = compare_conventions(theirs, matrices, convention)
     lines = _in_words(found, where)
     if "phi" in where:
@@ -131,14 +132,17 @@ def _directions(
     return {name[2:].replace("-", "_"): found[name[2:].replace("-", "_")] for name in known[what]}
 
 
-def _refuse_another_order(shape: tuple[int, ...], where: dict[str, np.ndarray]) -> None:
-    """Refuse a grid whose axes are ours in another order."""
+def _refuse_another_grid(shape: tuple[int, ...], where: dict[str, np.ndarray]) -> None:
+    """Refuse another number of matrices than ours, and axes that are ours in another order."""
     sizes = {name: len(set(values)) for name, values in where.items()}
+    order = ", ".join(f"{name.replace('theta', 'θ').replace('phi', 'φ')} ({n})" for name, n in sizes.items())
     given, wanted = ([size for size in x if size > 1] for x in (shape, sizes.values()))
-    if given != wanted and sorted(given) == sorted(wanted):
-        order = ", ".join(
-            f"{name.replace('theta', 'θ').replace('phi', 'φ')} ({n})" for name, n in sizes.items()
+    theirs, ours = math.prod(shape), len(where["theta_i"])
+    if theirs != ours:
+        raise PbrdfError(
+            f"the file holds {theirs} matrices (axes {shape}), there are {ours} of ours: {order}"
         )
+    if given != wanted and sorted(given) == sorted(wanted):
         raise PbrdfError(f"the axes of the file are {shape}; those of ours are {order}, in this order")
 
 
