@@ -1,7 +1,6 @@
 """The file of every pixel holds what the reduction found, as netCDF and as Zarr."""
 
 import json
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -87,7 +86,7 @@ def test_angles_beside_minus_90_degrees_are_not_rounded_to_it(tmp_path, frames):
         stokes=stokes, covariance=np.zeros((4, 4, 1, 3)), flags=np.zeros((1, 3), np.uint8)
     )
     with MapWriter(tmp_path / "stokes.nc", frames, instrument) as writer:
-        found = writer.prepare(SimpleNamespace(image=image))["aolp"][0]
+        found = writer.prepare(block)["aolp"][0]
     assert found.tolist() == [90.0, 90.0, pytest.approx(-89.7135)]
 
 
