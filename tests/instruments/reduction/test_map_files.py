@@ -82,9 +82,8 @@ def test_angles_beside_minus_90_degrees_are_not_rounded_to_it(tmp_path, frames):
     """Single precision has no number between −90° and what U = −1e-10 makes of it: it is the other end."""
     instrument = Instrument(lcvr(retardance_set("tetrahedron")), DETECTOR)
     stokes = np.array([[1.0, 1.0, 1.0], [-1.0, -1.0, -1.0], [-1e-10, -0.0, -0.01], [0.0, 0.0, 0.0]])[:, None]
-    image = SimpleNamespace(
-        stokes=stokes, covariance=np.zeros((4, 4, 1, 3)), flags=np.zeros((1, 3), np.uint8)
-    )
+    nothing = {"covariance": np.zeros((4, 4, 1, 3)), "flags": np.zeros((1, 3), np.uint8)}
+    block = type("Block", (), {"image": type("StokesImage", (), {"stokes": stokes, **nothing})})
     with MapWriter(tmp_path / "stokes.nc", frames, instrument) as writer:
         found = writer.prepare(block)["aolp"][0]
     assert found.tolist() == [90.0, 90.0, pytest.approx(-89.7135)]
