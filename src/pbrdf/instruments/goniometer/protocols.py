@@ -306,7 +306,8 @@ class Protocol:
         angle = np.arctan2(*(np.einsum("gk,gk->g", x, rays[name]) for name in reversed(axes)))
         # rounding must not tell −90° from 90°, nor 180° from 0°
         angle = np.mod(angle, np.pi)
-        values: np.ndarray = np.where(angle > 0.5 * np.pi + 1e-12, angle - np.pi, angle)
+        right = 0.5 * np.pi
+        values: np.ndarray = np.where(angle > right + 1e-12, angle - np.pi, np.minimum(angle, right))
         return values
 
     def displaced(self, turn: ArrayLike, camera: ArrayLike, tilt: ArrayLike = 0.0) -> Protocol:
