@@ -99,6 +99,31 @@ def test_flat_surfaces_reflect_alike(program):
     assert_allclose(converted, reflection(known), atol=tolerance(program))
 
 
+@pytest.mark.parametrize("program", convert.PROGRAMS)
+def test_what_is_no_matrix_is_refused_and_nothing_is_broadcast(program):
+    """A vector would become a matrix by broadcasting; imaginary parts would be dropped."""
+    mueller = convert.PROGRAMS[program]
+    for wrong in (
+        1.0,
+        np.ones(4),
+        np.ones((4, 4, 3)),
+        np.ones((2, 3, 3)),
+        np.eye(4) * (1 + 1j),
+        [["a"] * 4] * 4,
+    ):
+        with pytest.raises(DataError, match=r"Mueller matrices are real numbers of the shape \(..., 4, 4\)"):
+            mueller(wrong)
+    jones = np.full((2, 4, 4), 1 + 1e-17j)
+    jones[1, 2, 2] = np.nan
+    assert_array_equal(mueller(jones), mueller(jones.real))
+    with pytest.raises(DataError, match=r"numpy.moveaxis\(x, \(0, 1\), \(-2, -1\)\)"):
+        mueller(np.ones((4, 4, 3)))
+    if program != "pyelli":
+        for wrong in (1.0, np.ones(3), np.ones((4, 1))):
+            with pytest.raises(DataError, match=r"Stokes vectors are real numbers of the shape \(..., 4\)"):
+                getattr(convert, f"from_{program}_stokes")(wrong)
+
+
 #: Signs of Q, U and V by which theirs become ours.
 SIGNS = {
     "katsu": (1, 1, -1),
@@ -199,6 +224,10 @@ def test_mueller_of_pyelli_has_m00_divided_out():
     assert_allclose(convert.from_pyelli_mueller(theirs, known["R"])[:, 0, 0], known["R"], atol=1e-12)
     with pytest.raises(DataError, match="M00 = 1"):
         convert.from_pyelli_mueller(0.5 * theirs)
+    with pytest.raises(DataError, match=r"\(2,\) for matrices of \(6,\)"):
+        convert.from_pyelli_mueller(theirs, known["R"][:2])
+    theirs[0] = np.nan
+    assert_array_equal(convert.from_pyelli_mueller(theirs, 0.5), 0.5 * theirs)
 
 
 def test_index_of_pyelli_has_the_other_sign():

@@ -6,6 +6,8 @@ import pytest
 
 import pbrdf
 from every_model import EVERY, example
+from pbrdf.backend import get_backend
+from pbrdf.explorer import evaluation
 from pbrdf.explorer.evaluation import DARK, Grid, described, fields, prepare
 from pbrdf.explorer.state import QUANTITIES, Layer, Light, State, StateError
 from pbrdf.explorer.views import hemisphere, mueller
@@ -135,6 +137,12 @@ def test_difference_of_two_models(white):
                 )
             else:
                 np.testing.assert_allclose(half, a - b, rtol=1e-3, atol=1e-4, err_msg=picture.quantity)
+
+
+def test_axes_across_each_other_differ_by_plus_90_degrees():
+    angles = np.array([[90.0, 0.0], [0.0, 90.0], [-45.0, 45.0], [45.0, -45.0], [80.0, -80.0]]).T
+    found = evaluation._difference("aolp", *(get_backend().Float32(one) for one in angles)).numpy()
+    np.testing.assert_allclose(found, [90.0, 90.0, 90.0, 90.0, -20.0], atol=1e-4)
 
 
 def test_a_model_does_not_differ_from_itself(white):

@@ -161,6 +161,20 @@ def test_where_nothing_is_polarised_there_is_no_angle(served, page, white):
     assert page.locator(".readout").inner_text() == "θ 71°, φ 0° · AoLP 0°"
 
 
+def test_light_along_s_is_at_plus_90_degrees(served, page):
+    """The end of the range that belongs to it, in the plane of incidence and everywhere around the normal."""
+    kind = find_model("priest-germer")
+    mirror = kind.from_values({p.name: p.default for p in kind.parameters})
+    changes = {"quantities": ["aolp"], "settings": {"page": {"views": ["hemisphere"]}}}
+    page.goto(served(lambda: Shown([("mirror", mirror)], changes)))
+    board = page.locator(".board")
+    board.locator("canvas").first.wait_for()
+    board.focus()
+    for _ in range(4):
+        page.keyboard.press("Shift+ArrowRight")
+    assert page.locator(".readout").inner_text() == "θ 40°, φ 0° · AoLP 90°"
+
+
 def test_where_there_is_no_light_no_number_is_read(served, page):
     """A surface without body light is black far from its lobe: neither dark nor polarised in numbers."""
     kind = find_model("priest-germer")

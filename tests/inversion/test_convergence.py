@@ -127,7 +127,7 @@ def test_geometries_count_once_unless_their_group_or_wavelength_matters():
     angles = (
         np.array([0.5, 0.5, 0.5, 0.5]),
         np.array([0.2, 0.2, 0.2, 0.4]),
-        np.array([0.0, 2.0 * np.pi, 0.0, 0.0]),
+        np.array([0.0, 2.0 * np.pi, -1e-17, 0.0]),
     )
     ds = pbrdf.make_dataset(
         *angles, quantity="brdf", I=np.ones(4), Q=np.array([0.1, np.nan, 0.1, np.nan]), group=np.array([1, 1, 2, 2]),

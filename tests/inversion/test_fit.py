@@ -316,6 +316,22 @@ def test_points_that_were_not_measured_carry_no_weight():
     assert np.isnan(result.comparison["Q_residual"].values[:20]).all()
 
 
+@pytest.mark.slow
+def test_geometries_that_are_nan_are_as_if_they_were_not_there():
+    """One NaN does not bring back the starting values and call that a success, as lmfit's "propagate" does."""
+    dataset = pbrdf.open_experiment("cd-back")
+    holes = dataset.copy(deep=True)
+    for name in "IQUV":
+        holes[name][[5, 40]] = np.nan
+    without = pbrdf.fit(dataset.drop_isel(geometry=[5, 40]), starts=2)
+    found = pbrdf.fit(holes, starts=2)
+    assert found.goodness.data == without.goodness.data == 4 * 61
+    for name, expected in without.estimates.items():
+        assert found.estimates[name].value == pytest.approx(expected.value, rel=1e-9)
+        assert found.estimates[name].std == pytest.approx(expected.std, rel=1e-6, nan_ok=True)
+        assert found.estimates[name].verdict == expected.verdict
+
+
 def test_several_optima_are_listed_with_their_starts(bundled_fits):
     """The smoothest paint has a second basin, where the lobe is missed altogether."""
     result = bundled_fits["white"]

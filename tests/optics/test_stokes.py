@@ -86,4 +86,5 @@ def test_light_along_s_is_at_plus_90_degrees_whatever_the_sign_of_a_u_that_is_ze
     assert aolp(stokes) == np.pi / 2
     assert dolp_aolp_from_stokes(stokes)[1] == np.pi / 2
     assert aolp(xr.DataArray(stokes, dims="stokes_out")).item() == np.pi / 2
+    assert aolp(xr.DataArray(np.float32(stokes), dims="stokes_out")).item() == np.pi / 2
     assert aolp(get_backend().module.Array4f64(*stokes)).numpy()[0] == np.pi / 2

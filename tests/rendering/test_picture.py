@@ -78,6 +78,15 @@ def test_dolp_and_aolp():
     assert np.rad2deg(picture.aolp[0]) == pytest.approx([0.0, 45.0, 90.0, -45.0])
 
 
+def test_angles_beside_minus_90_degrees_are_not_rounded_to_it(mitsuba, picture, tmp_path):
+    """Single precision has no number between −90° and what U = −1e-10 makes of it: it is the other end."""
+    picture.stokes[:, 0, 1] = [1.0, -1.0, -1e-10, 0.0]
+    write_exr(picture, tmp_path / "p.exr")
+    bitmap = mitsuba.Bitmap(str(tmp_path / "p.exr"))
+    layer = [channel.name for channel in bitmap.struct_()].index("AoLP.Y")
+    assert np.array(bitmap)[0, 1, layer] == 90.0
+
+
 def test_where_there_is_no_light_there_is_no_polarisation(picture):
     assert np.isnan(picture.dolp[0, 0])
     assert np.isnan(picture.aolp[0, 0])

@@ -15,6 +15,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pbrdf.errors import DataError
 from pbrdf.optics.angles import within_half_turn
 
 __all__ = [
@@ -31,6 +32,7 @@ __all__ = [
     "mueller_swap_sp",
     "mueller_xyxy_to_sp",
     "qu_from_dolp_aolp",
+    "real_array",
     "reflectance_factor_to_brdf",
     "remove_cosine_weight",
     "stokes_flip_v",
@@ -39,6 +41,41 @@ __all__ = [
 
 _SWAP_SP = np.array([1.0, -1.0, -1.0, 1.0])
 _FLIP_V = np.array([1.0, 1.0, 1.0, -1.0])
+#: Imaginary parts up to this share of the largest element are the rounding of a calculation with Jones matrices.
+_ROUNDING = 1e-9
+
+
+def real_array(values: ArrayLike, what: str, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """Real numbers whose last dimensions have a given shape.
+
+    Parameters
+    ----------
+    values
+        What a program gave; complex numbers whose imaginary parts are rounding pass for real ones.
+    what
+        What they are, for the message.
+    shape
+        Of one vector or matrix: (4,) or (4, 4).
+
+    Raises
+    ------
+    DataError
+        If they are none. Says where the four components stand if that is not at the end.
+    """
+    array = np.asarray(values)
+    if array.dtype.kind == "c":
+        largest = np.nan_to_num(abs(array.real)).max(initial=0.0)
+        if not (abs(array.imag) > _ROUNDING * largest).any():
+            array = array.real
+    wanted = f"(..., {', '.join(map(str, shape))})"
+    if array.shape[-len(shape) :] != shape or array.dtype.kind not in "fiu":
+        message = f"{what} are real numbers of the shape {wanted}; these are {array.dtype} of {array.shape}"
+        if array.dtype.kind in "fiu" and array.ndim > len(shape) and array.shape[: len(shape)] == shape:
+            # Dr.Jit's matrices as arrays; their ``.T`` has rows and columns exchanged as well.
+            first, last = tuple(range(len(shape))), tuple(range(-len(shape), 0))
+            message += f": numpy.moveaxis(x, {first}, {last}) puts them so"
+        raise DataError(message)
+    return array.astype(np.float64)
 
 
 def azimuth_forward_pi_to_zero(phi: ArrayLike, half_turn: float = np.pi) -> NDArray[np.float64]:

@@ -182,8 +182,8 @@ def _difference(quantity: str, first: Any, second: Any) -> Any:
     if quantity == POLARISED:
         return dr.minimum(first, second)
     difference = first - second
-    # axes differ by a right angle at most
-    return difference - 180.0 * dr.round(difference / 180.0) if quantity == "aolp" else difference
+    # axes differ by a right angle at most, and that is +90° either way
+    return difference - 180.0 * dr.ceil((difference - 90.0) / 180.0) if quantity == "aolp" else difference
 
 
 def fields(

@@ -15,6 +15,7 @@ from pbrdf.data.covariance import correlations
 from pbrdf.data.schema import COVARIANCE, NORMALISED, VARIABLES, is_ratio, std_name, with_group
 from pbrdf.errors import FitError
 from pbrdf.inversion.noise import Noise, NoiseModel
+from pbrdf.optics.angles import rounded_azimuth
 from pbrdf.optics.stokes import STOKES
 
 if TYPE_CHECKING:
@@ -206,8 +207,8 @@ class Observations:
         """
         measured = np.isfinite(self.std)
         used = measured.any(axis=0)
-        phi = np.mod(self.phi, 2.0 * np.pi)
-        columns = [np.round(angle[used], 9) for angle in (self.theta_i, self.theta_r, phi)]
+        columns = [np.round(angle[used], 9) for angle in (self.theta_i, self.theta_r)]
+        columns.append(rounded_azimuth(self.phi[used]))
         for wanted, column in ((by_group, self.group), (by_wavelength, self.wavelength)):
             if wanted and column is not None:
                 columns.append(np.unique(column[used], return_inverse=True)[1].astype(float))

@@ -14,7 +14,7 @@ from pbrdf.inversion.minimise import solve
 from pbrdf.inversion.observations import Observations
 from pbrdf.inversion.optimum import Optimum
 from pbrdf.inversion.problem import Space, residuals
-from pbrdf.inversion.solver import Solution, Status
+from pbrdf.inversion.solver import Solution, Status, on_bounds
 from pbrdf.inversion.statistics import covariance, prior_spread
 
 __all__ = ["Lowest", "Optima", "Refit"]
@@ -101,8 +101,7 @@ class Optima:
     def at(cls, space: Space, data: Sequence[Observations], u: np.ndarray, information: np.ndarray) -> Optima:
         """Optima of D data sets: unknowns of shape (D, P) and information of shape (D, P, P)."""
         low, high = space.box
-        span = high - low
-        at_bound = (u <= low + 1e-9 * span) | (u >= high - 1e-9 * span)
+        at_bound = np.logical_or(*on_bounds(u, low, high))
         linear = [
             _linearised(matrix, prior_spread(low, high), on)
             for matrix, on in zip(information, at_bound, strict=True)

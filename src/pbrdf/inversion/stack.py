@@ -18,6 +18,7 @@ from pbrdf.errors import FitError
 from pbrdf.inversion.noise import Noise
 from pbrdf.inversion.observations import SINGULAR, Observations, measurements
 from pbrdf.inversion.statistics import middle
+from pbrdf.optics.angles import rounded_azimuth
 from pbrdf.optics.stokes import STOKES
 
 __all__ = ["Stack"]
@@ -253,7 +254,7 @@ class Stack:
 
     def different_values(self) -> np.ndarray:
         """Number of values that a model can tell apart, shape (B,): see :meth:`Observations.distinct`."""
-        phi = np.mod(self.phi, 2.0 * np.pi)
+        phi = rounded_azimuth(self.phi)
         # three numbers in one: it differs where any of them does
         place = sum(
             np.round(angle, 9) * factor

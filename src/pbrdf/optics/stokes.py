@@ -65,7 +65,7 @@ def aolp(stokes: Any) -> Any:
         return dr.select(angle <= -right, right, angle)
     import numpy as np
 
-    angle = 0.5 * np.arctan2(u, q)
+    angle = 0.5 * np.arctan2(u, q, dtype=float)
     # -π/2 alone lies at or below the open end: the other end is the same direction
     return angle + np.pi * (angle <= -right)
 

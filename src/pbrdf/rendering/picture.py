@@ -17,6 +17,7 @@ import numpy as np
 
 from pbrdf.errors import DataError
 from pbrdf.files.atomic import atomic_file
+from pbrdf.optics.angles import within_half_turn
 from pbrdf.optics.elements import diattenuator
 from pbrdf.optics.stokes import aolp, dolp
 
@@ -110,7 +111,9 @@ def write_exr(picture: StokesPicture, path: Path, polarizers: Sequence[float] = 
     layers = {f"S{i}.Y": picture.stokes[i] for i in range(4)}
     if np.isfinite(picture.std).any():
         layers |= {f"S{i}.std": picture.std[i] for i in range(4)}
-    layers |= {"DoLP.Y": picture.dolp, "AoLP.Y": np.rad2deg(picture.aolp)}
+    # in single precision, which rounds what lies beside −90° to it
+    angle = within_half_turn(np.rad2deg(picture.aolp).astype(np.float32), 90.0)
+    layers |= {"DoLP.Y": picture.dolp, "AoLP.Y": angle}
     layers |= {f"{polarizer_name(a)}.Y": picture.through_polarizer(a) for a in polarizers}
     values = np.ascontiguousarray(np.stack(list(layers.values()), axis=-1), dtype=np.float32)
     bitmap = mi.Bitmap(values, pixel_format=mi.Bitmap.PixelFormat.MultiChannel, channel_names=list(layers))

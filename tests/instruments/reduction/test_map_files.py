@@ -78,6 +78,17 @@ def test_what_was_found_is_read_back(tmp_path, frames, kind):
     assert file.attrs["reference_angle_degree"] == pytest.approx(20.0)
 
 
+def test_angles_beside_minus_90_degrees_are_not_rounded_to_it(tmp_path, frames):
+    """Single precision has no number between −90° and what U = −1e-10 makes of it: it is the other end."""
+    instrument = Instrument(lcvr(retardance_set("tetrahedron")), DETECTOR)
+    stokes = np.array([[1.0, 1.0, 1.0], [-1.0, -1.0, -1.0], [-1e-10, -0.0, -0.01], [0.0, 0.0, 0.0]])[:, None]
+    nothing = {"covariance": np.zeros((4, 4, 1, 3)), "flags": np.zeros((1, 3), np.uint8)}
+    block = type("Block", (), {"image": type("StokesImage", (), {"stokes": stokes, **nothing})})
+    with MapWriter(tmp_path / "stokes.nc", frames, instrument) as writer:
+        found = writer.prepare(block)["aolp"][0]
+    assert found.tolist() == [90.0, 90.0, pytest.approx(-89.7135)]
+
+
 def test_components_that_are_not_determined_have_no_variable(tmp_path, frames):
     file = written(tmp_path / "stokes.nc", rotating_polarizer(np.deg2rad([0, 45, 90, 135])), frames)
     assert {"I", "Q", "U", "cov_QU", "aolp"} <= set(file.data_vars)

@@ -56,6 +56,13 @@ def test_the_angle_of_the_axis_has_no_ends():
     assert std[1] == pytest.approx(std[0], rel=0.02)
 
 
+def test_an_axis_along_y_is_at_plus_90_degrees():
+    """Whatever the sign of a U that is nothing."""
+    unknown = np.full((2, 16, 16), np.nan)
+    axes = means_of(retarder(0.5 * np.pi * np.array([1.0, -1.0]), 1.0), unknown)
+    assert mueller_properties(axes)["fast_axis_deg"][0] == pytest.approx([90.0, 90.0], abs=1e-9)
+
+
 def test_what_is_not_known_is_nan():
     """A polariser has no retardance; without a covariance there are values and no errors, without light nothing."""
     matrices = [diattenuator(0.2), retarder(0.2, 1.0), np.full((4, 4), np.nan)]

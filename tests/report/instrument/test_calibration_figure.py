@@ -94,6 +94,8 @@ def test_angle_errors_are_the_short_way_round():
 
     assert np.rad2deg(angle_errors(light(89.0), light(-89.0)))[0] == pytest.approx(-2.0)
     assert np.rad2deg(angle_errors(light(31.0), light(30.0)))[0] == pytest.approx(1.0)
+    for across in (90.0, -90.0):
+        assert np.rad2deg(angle_errors(light(across), light(0.0)))[0] == 90.0
     natural = np.array([[1.0], [0.001], [0.0], [0.0]])
     assert np.isnan(angle_errors(natural, natural)[0])
 

@@ -211,7 +211,7 @@ class HemispherePainter {
     const first = corner(0, 0), near = v => cyclic ? v - 180 * Math.round((v - first) / 180) : v;
     const row = dr => near(corner(dr, 0)) * (1 - c + c0) + near(corner(dr, 1)) * (c - c0);
     const value = row(0) * (1 - r + r0) + row(1) * (r - r0);
-    if (cyclic) return value - 180 * Math.round(value / 180);
+    if (cyclic) return value - 180 * Math.ceil((value - 90) / 180);
     return picture.logarithmic ? 10 ** value : value;
   }
 }

@@ -29,6 +29,7 @@ from pbrdf.instruments.goniometer.rays import UPRIGHT, across, angles_of
 from pbrdf.instruments.pixel_geometry.camera import Lamp, PixelCamera
 from pbrdf.instruments.pixel_geometry.geometry import plane_rotation
 from pbrdf.models.base import Model
+from pbrdf.optics.angles import within_turn
 from pbrdf.optics.elements import diattenuator
 
 __all__ = ["LAMP", "MODES", "POLARISERS", "draw", "picture"]
@@ -234,7 +235,7 @@ def _lamp(content: Any) -> Lamp:
     polar = number(content.get("polar", LAMP[0]), "settings.sphere.light.polar")
     azimuth = number(content.get("azimuth", LAMP[1]), "settings.sphere.light.azimuth")
     try:
-        return Lamp(math.radians(polar), math.radians(azimuth % 360.0))
+        return Lamp(math.radians(polar), math.radians(float(within_turn(azimuth, 360.0))))
     except DataError as error:
         raise StateError("settings.sphere.light.polar", str(error)) from None
 

@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike
 from pbrdf.errors import DataError
 from pbrdf.instruments.goniometer.angle_table import AngleTable
 from pbrdf.instruments.goniometer.rays import angles_of, between, ray_vectors
+from pbrdf.optics.angles import within_turn
 
 __all__ = ["BISTATIC", "LABORATORIES", "SAMPLE_ANGLES", "Protocol", "crowded_sample_angles"]
 
@@ -248,7 +249,7 @@ class Protocol:
         columns: dict[str, Any] = {
             c: np.tile(getattr(self, c), size) for c in ("theta_i", "theta_r", "group", "sample_angle")
         }
-        phi = np.concatenate([np.mod(self.phi + turn, 2.0 * np.pi) for turn in turns])
+        phi = np.concatenate([within_turn(self.phi + turn) for turn in turns])
         shown = ", ".join(f"{_decimal(turn):g}°" for turn in turns)
         return replace(
             self, phi=phi, laboratory=laboratory, name=f"{self.name}, at azimuths {shown}", **columns
@@ -305,7 +306,8 @@ class Protocol:
         angle = np.arctan2(*(np.einsum("gk,gk->g", x, rays[name]) for name in reversed(axes)))
         # rounding must not tell −90° from 90°, nor 180° from 0°
         angle = np.mod(angle, np.pi)
-        values: np.ndarray = np.where(angle > 0.5 * np.pi + 1e-12, angle - np.pi, angle)
+        right = 0.5 * np.pi
+        values: np.ndarray = np.where(angle > right + 1e-12, angle - np.pi, np.minimum(angle, right))
         return values
 
     def displaced(self, turn: ArrayLike, camera: ArrayLike, tilt: ArrayLike = 0.0) -> Protocol:

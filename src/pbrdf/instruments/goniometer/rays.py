@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from pbrdf.backend import get_backend
+from pbrdf.optics.angles import within_turn
 from pbrdf.optics.geometry import geometry_from_angles
 
 __all__ = ["UPRIGHT", "across", "angles_of", "between", "ray_vectors"]
@@ -54,4 +55,4 @@ def angles_of(
     left = np.cross(normal, forward)
     phi = np.arctan2((camera * left).sum(-1), (camera * forward).sum(-1))
     none = (np.abs(phi) < 1e-12) | (np.linalg.norm(seen, axis=-1) < UPRIGHT)
-    return between(normal, source), between(normal, camera), np.mod(np.where(none, 0.0, phi), 2.0 * np.pi)
+    return between(normal, source), between(normal, camera), within_turn(np.where(none, 0.0, phi))

@@ -19,6 +19,7 @@ from pbrdf.data.build import make_dataset
 from pbrdf.data.schema import COVARIANCE, DIMENSION
 from pbrdf.errors import DataError
 from pbrdf.instruments.pixel_geometry.labels import label_names
+from pbrdf.optics.angles import within_turn
 from pbrdf.optics.stokes import STOKES
 
 __all__ = ["BIN", "as_geometries"]
@@ -246,6 +247,6 @@ def _binned(pixels: _Pixels, width: float) -> _Pixels:
         scatters = np.trace(covariance, axis1=1, axis2=2) > np.trace(own, axis1=1, axis2=2)
         covariance = np.where(scatters[:, None, None], covariance, own)
     kept = (np.diagonal(covariance, axis1=1, axis2=2) > 0.0).all(axis=1)
-    angles[:, 2] = np.mod(angles[:, 2], 2.0 * np.pi)
+    angles[:, 2] = within_turn(angles[:, 2])
     angles[:, :2] = np.maximum(angles[:, :2], 0.0)
     return _Pixels(angles[kept], values[kept], covariance[kept], pixels.series[first][kept])

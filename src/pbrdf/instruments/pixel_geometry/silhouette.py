@@ -571,7 +571,7 @@ def _bar(
         x=float(centre[0]),
         y=float(centre[1]),
         half_width=float(half),
-        angle=math.atan2(-float(along[1]), float(along[0])),
+        angle=min(math.atan2(-float(along[1]), float(along[0])), 0.5 * math.pi),
         length=None if all(leaves) else high - low,
         edges=edges,
         residual=residual,

@@ -31,6 +31,7 @@ from pbrdf.instruments.polarimeter.instrument import Instrument
 from pbrdf.instruments.polarimeter.polarization_errors import debiased_dolp, polarization
 from pbrdf.instruments.reduction.stokes_image import BAD_FLAGS
 from pbrdf.instruments.reduction.streaming import Block
+from pbrdf.optics.angles import within_half_turn
 from pbrdf.optics.stokes import STOKES
 
 __all__ = ["MapWriter"]
@@ -207,7 +208,8 @@ class MapWriter:
             "dolp": found.dolp,
             "dolp_debiased": debiased_dolp(stokes, covariance),
             "dolp_std": found.dolp_std,
-            "aolp": np.rad2deg(found.aolp),
+            # in single precision, which rounds what lies beside −90° to it
+            "aolp": within_half_turn(np.rad2deg(found.aolp).astype(np.float32), 90.0),
             "aolp_std": np.rad2deg(found.aolp_std),
             "docp": found.docp,
             "docp_std": found.docp_std,

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from pbrdf.instruments.reduction.mueller_reduction import MuellerMeans
+from pbrdf.optics.angles import within_half_turn
 from pbrdf.optics.decomposition import lu_chipman
 from pbrdf.optics.mueller import depolarization_index
 
@@ -37,8 +38,8 @@ def mueller_properties(means: MuellerMeans) -> Properties:
     -------
     dict
         By name two arrays of the shape (M,): ``diattenuation``, ``polarizance``, ``retardance_deg``, ``fast_axis_deg``
-        (the angle of its linear part from x towards y), ``depolarization``, ``depolarization_index``. NaN where the
-        matrix does not determine them, errors also where nothing says how noisy the readings are.
+        (the angle of its linear part from x towards y, within (−90, 90]), ``depolarization``, ``depolarization_index``.
+        NaN where the matrix does not determine them, errors also where nothing says how noisy the readings are.
     """
     count = len(means.names)
     known = np.isfinite(means.covariance).all(axis=(1, 2))
@@ -63,7 +64,9 @@ def _quantities(matrices: np.ndarray) -> dict[str, np.ndarray]:
         "diattenuation": parts.diattenuation,
         "polarizance": parts.polarizance,
         "retardance_deg": np.rad2deg(parts.retardance),
-        "fast_axis_deg": 0.5 * np.rad2deg(np.arctan2(parts.fast_axis[..., 1], parts.fast_axis[..., 0])),
+        "fast_axis_deg": within_half_turn(
+            0.5 * np.rad2deg(np.arctan2(parts.fast_axis[..., 1], parts.fast_axis[..., 0])), 0.5 * _HALF_TURN
+        ),
         "depolarization": parts.depolarization,
         "depolarization_index": depolarization_index(matrices),
     }

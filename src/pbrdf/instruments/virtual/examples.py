@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 from PIL import Image
 
+from pbrdf.data.conventions import dolp_aolp_from_stokes
 from pbrdf.data.paints import WAVELENGTH, load_paint, open_experiment
 from pbrdf.data.readers import write
 from pbrdf.errors import DataError
@@ -196,15 +197,15 @@ def _write_ratios(path: Path) -> None:
         "theta_i [deg],theta_r [deg],phi [deg],position,DoLP (%),AoLP [deg],DoLP_std (%)",
     ]
     for (theta_i, theta_r, phi), row in _rows(dataset):
-        i, q, u, spread = (float(row[c]) for c in ("I", "Q", "U", "Q_std"))
-        degree, angle = 100.0 * float(np.hypot(q, u)) / i, np.rad2deg(0.5 * np.arctan2(u, q))
+        i, spread = (float(row[c]) for c in ("I", "Q_std"))
+        degree, angle = dolp_aolp_from_stokes([i, float(row["Q"]), float(row["U"])])
         numbers = (
             theta_i,
             theta_r,
             (phi + 180.0) % 360.0,
             int(row["group"]),
-            degree,
-            angle,
+            100.0 * float(degree),
+            np.rad2deg(angle),
             100.0 * spread / i,
         )
         lines.append(",".join(f"{number:.4g}" for number in numbers))

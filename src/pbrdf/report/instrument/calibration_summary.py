@@ -12,6 +12,7 @@ import numpy as np
 from pbrdf.files.atomic import atomic_file
 from pbrdf.instruments.calibration.analyzer_calibration import Calibration
 from pbrdf.instruments.calibration.settings_calibration import ModelCalibration
+from pbrdf.optics.angles import within_half_turn
 from pbrdf.optics.stokes import STOKES, aolp, docp, dolp
 from pbrdf.report.instrument.polarimeter_summary import merit_table, vector_table
 from pbrdf.report.numbers import brief, per_cent, with_error
@@ -120,7 +121,7 @@ def _accuracy(made: InstrumentCalibration) -> RenderableType:
 
 
 def angle_errors(found: np.ndarray, stokes: np.ndarray) -> np.ndarray:
-    """Errors of the AoLP, radians in [−π/2, π/2), shape (K, ...); NaN for light that is hardly linearly polarised.
+    """Errors of the AoLP, radians in (−π/2, π/2], shape (K, ...); NaN for light that is hardly linearly polarised.
 
     Parameters
     ----------
@@ -129,7 +130,7 @@ def angle_errors(found: np.ndarray, stokes: np.ndarray) -> np.ndarray:
     """
     true = np.reshape(stokes, (*stokes.shape, *(1,) * (found.ndim - 2)))
     difference = aolp(np.moveaxis(found, 0, -1)) - aolp(np.moveaxis(true, 0, -1))
-    wrapped = np.mod(difference + 0.5 * np.pi, np.pi) - 0.5 * np.pi
+    wrapped = within_half_turn(difference, 0.5 * np.pi)
     return np.where(np.hypot(true[1], true[2]) > _NO_ANGLE * true[0], wrapped, np.nan)
 
 

@@ -307,7 +307,7 @@ VIEWS.push({
     const onDisc = ([x, y]) => settings().mode === "polariser" && Math.hypot(x - DISC.x, y - DISC.y) < DISC.radius;
     const turn = ([x, y], dragging) => {
       const angle = Math.atan2(y - DISC.y, x - DISC.x) * 180 / Math.PI;
-      show("polariser", Number(((angle + 360) % 180).toFixed(1)), dragging);
+      show("polariser", Number(((angle + 360) % 180).toFixed(1)) % 180, dragging);
     };
     let grip = null;
     const drop = event => {
@@ -334,7 +334,7 @@ VIEWS.push({
       const [x, y] = pointed(event);
       const polar = 2 * Math.asin(Math.min(Math.hypot(x, y), 1)) * 180 / Math.PI,
         around = Math.atan2(y, x) * 180 / Math.PI;
-      light({ polar: Number(polar.toFixed(1)), azimuth: Number(((around + 360) % 360).toFixed(1)) }, true);
+      light({ polar: Number(polar.toFixed(1)), azimuth: Number(((around + 360) % 360).toFixed(1)) % 360 }, true);
     });
     canvas.addEventListener("pointerup", drop);
     canvas.addEventListener("pointercancel", drop);
