@@ -254,11 +254,9 @@ class Stack:
 
     def different_values(self) -> np.ndarray:
         """Number of values that a model can tell apart, shape (B,): see :meth:`Observations.distinct`."""
-        phi = rounded_azimuth(self.phi)
         # three numbers in one: it differs where any of them does
-        place = sum(
-            np.round(angle, 9) * factor
-            for angle, factor in zip((self.theta_i, self.theta_r, phi), (1.0, np.pi, np.e), strict=True)
+        place = (
+            np.round(self.theta_i, 9) + np.pi * np.round(self.theta_r, 9) + np.e * rounded_azimuth(self.phi)
         )
         for column in (self.group, self.wavelength):
             if column is not None:
