@@ -1,7 +1,8 @@
 """Derivatives of S0 … S3 by every parameter of a paint, under every integrator that docs/inverse-rendering.md names.
 
 Two balls that light each other stand under a polarised sky and a lamp: every component is there, directions are drawn
-by the lights and by the paint, and paths reflect twice.
+by the lights and by the paint, and paths reflect twice. Before `volpath` stands a retarder, through which `path` does
+not see.
 
 The differences are those of two pictures of one seed whose samples are drawn by one technique, that of the paint in the
 middle: both follow the same paths, and only the integrand differs. Without that a million samples would leave some
@@ -54,6 +55,15 @@ SIZE, SAMPLES, SEED = 8, 64, 7
 STEP = 0.01
 
 
+def _retarder(mi):
+    place = mi.ScalarTransform4f().look_at([0.15, -1.7, 0.6], [0.0, -3.0, 1.0], [0.0, 0.0, 1.0])
+    return {
+        "type": "rectangle",
+        "to_world": place,
+        "bsdf": {"type": "retarder", "theta": 20.0, "delta": 70.0},
+    }
+
+
 class Rendering:
     """The scene in one paint, whose parameters can be set.
 
@@ -72,8 +82,11 @@ class Rendering:
         self.values = values
         bsdf = described(mi)
         place = mi.ScalarTransform4f().look_at([-2.0, -2.0, 2.0], [0.0, 0.0, 0.0], [0.0, 0.0, 1.0])
+        # what `path` does not see through stands in front of the camera
+        plate = {} if kind != "volpath" else {"plate": _retarder(mi)}
         self.scene = mi.load_dict(
             {
+                **plate,
                 "type": "scene",
                 "sensor": Camera((0.0, -3.0, 1.0), (0.35, 0.0, 0.0), math.radians(30.0)).to_dict(SIZE, SIZE),
                 "sky": sky_dict(Sky(math.radians(50.0), math.radians(-60.0)), 1e3),
