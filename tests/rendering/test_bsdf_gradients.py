@@ -1,4 +1,4 @@
-"""Derivatives of the BSDF plugin with respect to the paint, at single points and through rendered pictures."""
+"""Derivatives of the BSDF plugin at single points; those of pictures: ``test_gradients_by_integrator.py``."""
 
 from __future__ import annotations
 
@@ -59,79 +59,3 @@ def test_derivative_of_a_value(name, accuracy, mode):
         dr.forward(x)
         found = total.grad[0]
     assert found == pytest.approx(expected, rel=2e-3, abs=2e-5)
-
-
-def ball(mi, integrator, paint):
-    T = mi.ScalarTransform4f
-    return mi.load_dict(
-        {
-            "type": "scene",
-            "integrator": integrator,
-            "sensor": {
-                "type": "perspective",
-                "fov": 30.0,
-                "to_world": T().look_at([0.0, -5.0, 2.0], [0.0, 0.0, 0.5], [0.0, 0.0, 1.0]),
-                "film": {"type": "hdrfilm", "width": 24, "height": 24, "rfilter": {"type": "box"}},
-            },
-            "sky": {"type": "constant", "radiance": 0.5},
-            "lamp": {
-                "type": "rectangle",
-                "to_world": T().look_at([2.0, -2.0, 4.0], [0.0, 0.0, 0.0], [0.0, 1.0, 0.0]),
-                "emitter": {"type": "area", "radiance": 8.0},
-            },
-            "ball": {"type": "sphere", "bsdf": {"type": "pbrdf", "accuracy": "fast", **paint}},
-            "floor": {
-                "type": "rectangle",
-                "to_world": T().translate([0.0, 0.0, -1.0]).scale(4.0),
-                "bsdf": {"type": "diffuse"},
-            },
-        }
-    )
-
-
-INTEGRATORS = {
-    "llvm_ad_rgb": {"type": "prb", "max_depth": 3},
-    "llvm_ad_mono_polarized": {"type": "stokes", "nested": {"type": "direct"}},
-}
-
-
-@pytest.mark.parametrize("variant", INTEGRATORS)
-@pytest.mark.parametrize("name", ["sigma", "n", "a", "t"])
-def test_derivative_of_a_picture(name, variant):
-    """Gradient of a weighted mean of the pixels against differences of two renderings; both carry noise."""
-    mi = use(variant)
-    import drjit as dr
-
-    mi.set_log_level(mi.LogLevel.Error)
-    paint = {**PAINT, "kappa": 0.0}
-    scene = ball(mi, INTEGRATORS[variant], paint)
-    parameters = mi.traverse(scene)
-    key = f"ball.bsdf.{name}.value"
-
-    def mean(image):
-        return dr.mean(image.array * (1.0 + 0.5 * dr.sin(dr.arange(mi.Float, dr.width(image.array)))))
-
-    def estimates(function, seeds):
-        values = [function(seed) for seed in seeds]
-        return np.mean(values), np.std(values, ddof=1) / len(values) ** 0.5
-
-    def gradient(seed):
-        x = mi.Float(paint[name])
-        dr.enable_grad(x)
-        parameters[key] = x
-        parameters.update()
-        dr.backward(mean(mi.render(scene, parameters, spp=128, seed=2 * seed, seed_grad=2 * seed + 1)))
-        return x.grad[0]
-
-    def difference(seed):
-        pair = []
-        for sign in (1.0, -1.0):
-            parameters[key] = mi.Float(paint[name] * (1.0 + 0.02 * sign))
-            parameters.update()
-            pair.append(mean(mi.render(scene, spp=256, seed=seed))[0])
-        return (pair[0] - pair[1]) / (0.04 * paint[name])
-
-    found, error = estimates(gradient, range(8))
-    expected, noise = estimates(difference, range(100, 108))
-    assert abs(found - expected) < 4.0 * np.hypot(error, noise) + 2e-3 * abs(expected)
-    assert abs(expected) > 5.0 * noise and error < 0.2 * abs(found)  # there is something to compare
