@@ -6,6 +6,9 @@ that it starts quickly; :mod:`pbrdf.files.hdf5_guard` starts it, asks it, and en
 
 Nothing is allocated before it is compared with the size of the file: deflate, the strongest common filter, packs at
 most 1032 bytes into one, so a file that declares far more than that holds next to nothing of what it declares.
+
+Numbers that were never written read as the fill value, which is 0 where nothing else is said: an array with such chunks
+is refused, unless its fill value says that nothing is there (NaN, or CF's ``_FillValue``).
 """
 
 from __future__ import annotations
@@ -89,13 +92,14 @@ def declared_bytes(path: str, groups: Sequence[str]) -> int:
     Raises
     ------
     RefusedError
-        If an array, its chunks or an attribute is larger than the file can hold, or kept in another file.
+        If an array, its chunks or an attribute is larger than the file can hold, or kept in another file; or an array
+        was not written as a whole.
     """
     import h5py
 
     size = os.path.getsize(path)  # noqa: PTH202  no import that is not needed
     most = max(ALWAYS_ALLOWED, MOST_TIMES_ITS_SIZE * size)
-    total = 0
+    total, unwritten = 0, ""
     with h5py.File(path, "r") as file:
         for name in groups:
             if name != "/" and not isinstance(file.get(name, getlink=True), h5py.HardLink):
@@ -107,10 +111,13 @@ def declared_bytes(path: str, groups: Sequence[str]) -> int:
                     bytes_of = _check_array(item, key, most)
                     _check_attributes(item, f"the variable {key!r}", size)
                     total += bytes_of
+                    unwritten = unwritten or _unwritten(item, key)
     if total > most:
         raise RefusedError(
             f"its variables declare {amount(total)} together, but the file has {amount(size)}: it is damaged"
         )
+    if unwritten:
+        raise RefusedError(unwritten)
     return total
 
 
@@ -147,6 +154,45 @@ def _check_array(array: Any, name: str, most: int) -> int:
             "this size cannot hold: it is damaged"
         )
     return declared
+
+
+def _unwritten(array: Any, name: str) -> str:
+    """What to say of an array whose missing numbers would be read as the fill value; empty if there are none.
+
+    Of one without chunks it is known only if all are missing.
+    """
+    import h5py
+    import numpy as np
+
+    shape = array.shape or ()
+    # a number alone, and a dimension without numbers, need not be written; MATLAB means 0 by what is not
+    if not shape or 0 in shape or array.dtype.kind not in "iufb" or "MATLAB_class" in array.attrs:
+        return ""
+    if bytes(array.attrs.get("NAME", b"")).startswith(
+        b"This is a netCDF dimension but not a netCDF variable"
+    ):
+        return ""
+    layout = array.id.get_create_plist().get_layout()
+    if layout == h5py.h5d.CHUNKED:
+        needed = math.prod(-(-length // chunk) for length, chunk in zip(shape, array.chunks, strict=True))
+        held, what = array.id.get_num_chunks(), "chunks"
+    elif layout == h5py.h5d.CONTIGUOUS:
+        needed, what = math.prod(shape), "values"
+        held = 0 if array.id.get_space_status() == h5py.h5d.SPACE_STATUS_NOT_ALLOCATED else needed
+    else:
+        return ""
+    fill = array.fillvalue
+    if held >= needed or fill != fill:
+        return ""
+    if any(
+        fill in np.ravel(array.attrs[key]) for key in ("_FillValue", "missing_value") if key in array.attrs
+    ):
+        return ""
+    return (
+        f"the variable {name!r} holds {held} of its {needed} {what}: the others were never written and would read as "
+        f"{fill}. If the program that writes the file was interrupted, run it again; if nothing is to stand there, "
+        "give the variable the attribute _FillValue"
+    )
 
 
 def _check_attributes(item: Any, name: str, size: int) -> None:
