@@ -148,7 +148,13 @@ def _are_others(dataset: xr.Dataset, source: MapSource) -> bool:
         stored = json.loads(str(dataset.attrs["map_settings"]))["input"]["files"]
     except (KeyError, TypeError, ValueError):
         return False
-    return bool(stored != json.loads(json.dumps(source.identity()))["files"])
+    found = json.loads(json.dumps(source.identity()))["files"]
+    if len(found) != len(stored):
+        return True
+    # what a map of a former version does not say of them cannot differ
+    return any(
+        own.get(key) != told for own, one in zip(found, stored, strict=True) for key, told in one.items()
+    )
 
 
 def _measured_at(name: str, indices: dict[str, int], workspace: Workspace) -> xr.Dataset:

@@ -150,6 +150,7 @@ def test_a_store_of_other_settings_or_another_input_is_refused_by_name(store):
     other = picture()
     other["I"][0, 0, 0] = 0.5
     named = picture().assign_attrs(quantity="radiance")
+    turned = picture().assign_coords(y=range(40)[::-1], wavelength=650.0)
     for make, words in (
         (lambda: store_at(store.path, seed=1), r"fit\.seed: 0 in the store, 1 here\. Choose another folder"),
         (
@@ -157,6 +158,10 @@ def test_a_store_of_other_settings_or_another_input_is_refused_by_name(store):
             r'input\.variables\.I\.digest: "[0-9a-f]{38}…" in the store, "',
         ),
         (lambda: store_at(store.path, named), r'attributes\.quantity: "brdf" in the store, "radiance" here'),
+        (
+            lambda: store_at(store.path, turned),
+            r'input\.labels\.wavelength: \(none\) in the store, "650\.0" here',
+        ),
         (lambda: store_at(store.path, picture(40, 30)), r"I\.form: .*x: 28.*in the store, .*x: 30"),
     ):
         with pytest.raises(

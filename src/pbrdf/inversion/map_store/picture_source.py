@@ -10,7 +10,7 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -18,10 +18,12 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from pbrdf.data.alignment import few, require_same_labels
+from pbrdf.data.formats.attributes import plain_attributes
 from pbrdf.data.formats.csv_table.columns import COVARIANCES
-from pbrdf.data.formats.stored import pixels_from_stored
+from pbrdf.data.formats.stored import NANOMETRES, pixels_from_stored
 from pbrdf.data.formats.zarr_folder import open_zarr
-from pbrdf.data.schema import COORDINATES, DIMENSION, STOKES_AXES
+from pbrdf.data.schema import COORDINATES, COVARIANCE, DIMENSION, NATURAL_LIGHT, STOKES_AXES, VARIABLES
 from pbrdf.errors import DataError
 from pbrdf.files.digest import sha256_of
 from pbrdf.files.netcdf_files import SIGNATURE, open_netcdf
@@ -36,6 +38,16 @@ from pbrdf.optics.stokes import STOKES
 __all__ = ["PictureSource", "opened_pictures"]
 
 _SERIES = "series"
+#: Attributes that say what the numbers of a file are, and what it means where one is not there.
+_MEANINGS: dict[str, Any] = {
+    "quantity": "dn",
+    "scale": None,
+    "stokes_convention": "p-s",
+    "illumination": list(NATURAL_LIGHT),
+    "simulated": 0,
+}
+#: Wavelengths that differ by no more are the same, nm.
+_SAME_WAVELENGTH = 0.5
 
 
 @dataclass(frozen=True)
@@ -88,7 +100,8 @@ class PictureSource:
         Raises
         ------
         DataError
-            If a file cannot be read, files do not fit each other, or a geometry is missing or one too many.
+            If a file cannot be read, files do not fit each other (other pixels, wavelengths or components, another
+            quantity or convention), or a geometry is missing or one too many.
         """
         opened = [opened_pictures(path) for path in paths]
         pictures = [DIMENSION not in one.dims for one in opened]
@@ -122,6 +135,8 @@ class PictureSource:
                 raise DataError(
                     f"{path}: has {_in_words(sizes)} pixels, {paths[0]} has {_in_words(found[0])}"
                 )
+        for path, one in zip(paths[1:], opened[1:], strict=True):
+            _require_alike(opened[0], paths[0], one, path, found[0])
         parts = None
         if labels is not None:
             if not {"y", "x"} <= set(found[0]):
@@ -265,6 +280,48 @@ def _pixel_sizes(path: Path, opened: xr.Dataset) -> dict[str, int]:
     if 0 in sizes.values():
         raise DataError(f"{path}: has no pixels, {_in_words(sizes)}")
     return sizes
+
+
+def _require_alike(first: xr.Dataset, name: Path, other: xr.Dataset, path: Path, dims: Iterable[str]) -> None:
+    """Raise if a file is labelled otherwise than the first one: nothing that is put together goes by its place."""
+    require_same_labels(other, str(path), first, str(name), dims)
+    meanings = [plain_attributes(one.attrs) for one in (other, first)]
+    for key, usual in _MEANINGS.items():
+        here, there = (attrs.get(key, usual) for attrs in meanings)
+        if here != there:
+            raise DataError(
+                f"{key} is {_said(here)} in {path}, and {_said(there)} in {name}: one map is made of one {key}"
+            )
+    here, there = (
+        ", ".join(n for n in map(str, one.data_vars) if n in VARIABLES or n == COVARIANCE)
+        for one in (other, first)
+    )
+    if sorted(here.split(", ")) != sorted(there.split(", ")):
+        raise DataError(
+            f"{path}: holds {here}, and {name} {there}: several files of a map hold the same components"
+        )
+    waves = [_wavelengths(one) for one in (other, first)]
+    if len(waves[0]) != len(waves[1]) or not np.allclose(
+        *waves, rtol=0.0, atol=_SAME_WAVELENGTH, equal_nan=True
+    ):
+        here, there = (few(one) or "not stated" for one in waves)
+        raise DataError(
+            f"wavelength is {here} in {path}, and {there} in {name}: a map has one set of parameters, and would take "
+            "them for the same; make a map of each"
+        )
+
+
+def _wavelengths(opened: xr.Dataset) -> np.ndarray:
+    """Those of a file, each once, nm; none where it states none."""
+    if "wavelength" not in opened.variables:
+        return np.empty(0)
+    found = opened["wavelength"]
+    factor = NANOMETRES.get(str(found.attrs.get("units", "nm")), 1.0)
+    return np.unique(factor * found.values.astype(float))
+
+
+def _said(value: Any) -> str:
+    return "not stated" if value is None else few(value)
 
 
 def _in_words(sizes: Mapping[str, int]) -> str:
