@@ -92,4 +92,4 @@ def _are_same(here: np.ndarray, there: np.ndarray) -> bool:
         spread = float(np.ptp(there)) if there.size else 0.0
         # single precision is no difference
         return bool(np.allclose(here, there, rtol=1e-6, atol=1e-6 * (spread or 1.0)))
-    return here.astype(str).tolist() == there.astype(str).tolist()
+    return bool((here.astype(str) == there.astype(str)).all())

@@ -85,7 +85,7 @@ def test_other_names_of_components_are_refused_in_any_file(tmp_path):
         ),
         (
             lambda d: d.assign_coords(wavelength=("geometry", [650.0, 650.0])),
-            r"wavelength is 650 in .*1\.nc, and not stated in .*0\.nc: a map has one set of parameters",
+            r"wavelength is 650 in .*1\.nc, and not stated in .*0\.nc: a map has one set of",
         ),
         (
             lambda d: d.rename(mueller="mueller_over_m00"),
@@ -126,3 +126,13 @@ def test_a_map_is_not_gone_on_with_where_the_components_stand_in_another_order(t
     told = list(differences(first.identity(), other.identity()))
     assert 'files[0].labels.stokes_in[1]: "Q" in the store, "U" here' in told
     assert 'files[0].labels.stokes_out[2]: "U" in the store, "Q" here' in told
+
+
+def test_a_pixel_that_one_file_leaves_out_is_left_out(tmp_path):
+    masks = np.ones((2, 3, 4), dtype=np.int8)
+    masks[0, 0, 0] = masks[1, 2, 3] = 0
+    both = [matrices(seed=k).assign(mask=(("y", "x"), mask)) for k, mask in enumerate(masks)]
+    for files in (both, [both[0], matrices(seed=1)], [matrices(), both[1]]):
+        found = PictureSource.open(stored(tmp_path, *files)).block({})["mask"]
+        expected = np.logical_and.reduce([f["mask"].values != 0 for f in files if "mask" in f])
+        np.testing.assert_array_equal(found, expected)

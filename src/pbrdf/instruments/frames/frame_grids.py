@@ -193,7 +193,7 @@ def _order(labels: xr.DataArray, states: Sequence[str]) -> list[int] | None:
         return [int(np.abs(np.subtract(found, one)).argmin()) for one in wanted]
     for first in (0, 1):
         if sorted(found) == list(range(first, first + len(states))):
-            return np.argsort(found).tolist()
+            return sorted(range(len(found)), key=found.__getitem__)
     return None
 
 

@@ -8,8 +8,10 @@ several series, or several geometries, of the same pixels.
 from __future__ import annotations
 
 import dataclasses
+import functools
 import hashlib
 import math
+import operator
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -32,7 +34,7 @@ from pbrdf.instruments.pixel_geometry.geometry import PixelGeometry
 from pbrdf.instruments.pixel_geometry.labels import read_labels
 from pbrdf.instruments.pixel_geometry.map_dataset import map_block
 from pbrdf.inversion.map_store.map_source import file_identity
-from pbrdf.inversion.parameter_map.map_fit import LABEL
+from pbrdf.inversion.parameter_map.map_fit import LABEL, MASK
 from pbrdf.optics.stokes import STOKES
 
 __all__ = ["PictureSource", "opened_pictures"]
@@ -161,15 +163,19 @@ class PictureSource:
                 shape = [self.sizes.get(str(d), size) for d, size in variable.sizes.items()]
                 values = np.broadcast_to(variable.values, shape)
                 variables[name] = xr.Variable(variable.dims, values, variable.attrs)
-        for dim in self.sizes:
-            if dim in self._files()[0].coords:
-                variables[dim] = self._files()[0][dim].variable
+        variables |= {dim: places.variable for dim, places in self.places.coords.items()}
         coords = {name for name in variables if name in first.coords}
         return xr.Dataset(
             {name: v for name, v in variables.items() if name not in coords},
             {name: variables[name] for name in coords},
             first.attrs,
         )
+
+    @property
+    def places(self) -> xr.Dataset:
+        """Coordinates of the pixels along each dimension, of those that have some."""
+        first = self._files()[0]
+        return xr.Dataset(coords={dim: first[dim] for dim in self.sizes if dim in first.coords})
 
     def block(self, region: Mapping[str, slice]) -> xr.Dataset:
         """Some pixels, in memory.
@@ -287,37 +293,37 @@ def _require_alike(first: xr.Dataset, name: Path, other: xr.Dataset, path: Path,
     require_same_labels(other, str(path), first, str(name), dims)
     meanings = [plain_attributes(one.attrs) for one in (other, first)]
     for key, usual in _MEANINGS.items():
-        here, there = (attrs.get(key, usual) for attrs in meanings)
-        if here != there:
+        values = [attrs.get(key, usual) for attrs in meanings]
+        if values[0] != values[1]:
             raise DataError(
-                f"{key} is {_said(here)} in {path}, and {_said(there)} in {name}: one map is made of one {key}"
+                f"{key} is {_said(values[0])} in {path}, and {_said(values[1])} in {name}: one map is made of one {key}"
             )
-    here, there = (
-        ", ".join(n for n in map(str, one.data_vars) if n in VARIABLES or n == COVARIANCE)
-        for one in (other, first)
-    )
-    if sorted(here.split(", ")) != sorted(there.split(", ")):
+    held = [
+        [n for n in map(str, one.data_vars) if n in VARIABLES or n == COVARIANCE] for one in (other, first)
+    ]
+    if sorted(held[0]) != sorted(held[1]):
         raise DataError(
-            f"{path}: holds {here}, and {name} {there}: several files of a map hold the same components"
+            f"{path}: holds {', '.join(held[0])}, and {name} {', '.join(held[1])}: several files of a map hold the "
+            "same components"
         )
-    waves = [_wavelengths(one) for one in (other, first)]
-    if len(waves[0]) != len(waves[1]) or not np.allclose(
-        *waves, rtol=0.0, atol=_SAME_WAVELENGTH, equal_nan=True
-    ):
-        here, there = (few(one) or "not stated" for one in waves)
+    here, there = _wavelengths(other), _wavelengths(first)
+    off = np.abs(np.subtract.outer(here, there)) > _SAME_WAVELENGTH
+    if bool(here.size) != bool(there.size) or off.all(axis=0).any() or off.all(axis=1).any():
+        said = [few(one) or "not stated" for one in (here, there)]
         raise DataError(
-            f"wavelength is {here} in {path}, and {there} in {name}: a map has one set of parameters, and would take "
-            "them for the same; make a map of each"
+            f"wavelength is {said[0]} in {path}, and {said[1]} in {name}: a map has one set of parameters for all, so "
+            "make a map of each"
         )
 
 
 def _wavelengths(opened: xr.Dataset) -> np.ndarray:
-    """Those of a file, each once, nm; none where it states none."""
+    """Those of a file, each once, nm; empty where it states none."""
     if "wavelength" not in opened.variables:
         return np.empty(0)
     found = opened["wavelength"]
     factor = NANOMETRES.get(str(found.attrs.get("units", "nm")), 1.0)
-    return np.unique(factor * found.values.astype(float))
+    values = np.unique(factor * found.values.astype(float))
+    return values[np.isfinite(values)]
 
 
 def _said(value: Any) -> str:
@@ -329,7 +335,7 @@ def _in_words(sizes: Mapping[str, int]) -> str:
 
 
 def _together(parts: Sequence[xr.Dataset], sizes: Mapping[str, int]) -> xr.Dataset:
-    """Geometries of several files one after the other; a coordinate along pixels is the first's."""
+    """Geometries of several files one after the other; a pixel that one of them leaves out is left out."""
     shared = {
         name for part in parts for name in COORDINATES if name in part and set(sizes) & set(part[name].dims)
     }
@@ -340,7 +346,7 @@ def _together(parts: Sequence[xr.Dataset], sizes: Mapping[str, int]) -> xr.Datas
             if name in part and not set(sizes) & set(part[name].dims):
                 part = part.assign_coords({name: part[name].expand_dims(_sizes_here(part, sizes))})
         spread.append(part)
-    return xr.concat(
+    found = xr.concat(
         spread,
         DIMENSION,
         data_vars="minimal",
@@ -349,6 +355,8 @@ def _together(parts: Sequence[xr.Dataset], sizes: Mapping[str, int]) -> xr.Datas
         join="override",
         combine_attrs="override",
     )
+    masks = [part[MASK] != 0 for part in parts if MASK in part.data_vars]
+    return found.assign({MASK: functools.reduce(operator.and_, masks)}) if masks else found
 
 
 def _sizes_here(part: xr.Dataset, sizes: Mapping[str, int]) -> dict[str, int]:
