@@ -21,7 +21,7 @@ import pbrdf
 from pbrdf.cli.main import app
 from pbrdf.inversion.map_store.made_from import MadeFrom
 from pbrdf.inversion.map_store.map_store import MapStore
-from pbrdf.inversion.parameter_map import PixelStatus
+from pbrdf.inversion.parameter_map import FLAGS, PixelStatus
 from pbrdf.inversion.parameter_map.map_fit import MapFit
 from pixel_helpers import blank, painted
 
@@ -212,6 +212,19 @@ def test_interrupted_it_goes_on_where_it_was(at_trial, tmp_path, whole, monkeypa
     result = at_trial(*common, code=130)
     assert result.stderr.splitlines()[-1] == (
         "pbrdf: error: interrupted; 3 of 8 units are kept in paint.zarr: the same command goes on from there"
+    )
+    # nothing of the other five can be taken for data, by xarray or by what reads maps
+    half, complete = opened(tmp_path / "paint.zarr"), opened(whole)
+    pending = half["status"].values == -1
+    assert half.attrs["map_complete"] == 0 and 0 < pending.sum() < pending.size
+    for name in ("estimate", "standard_error", "chi2", "degrees_of_freedom", "starts", "optima"):
+        assert np.isnan(half[name].values[..., pending]).all()
+        np.testing.assert_array_equal(half[name].values[..., ~pending], complete[name].values[..., ~pending])
+    assert (half["flags"].values[:, pending] == FLAGS["not_yet_fitted"]).all()
+    told = at_trial("identify", "paint.zarr", code=2).stderr
+    assert (
+        "this map is not complete: 5 of 8 units are missing; the command that began it goes on with it"
+        in told
     )
     monkeypatch.setattr(
         MapStore, "do", lambda self, number, progress: (done.append(number), do(self, number, progress))
