@@ -99,6 +99,26 @@ def test_an_array_without_chunks_that_was_never_written_is_no_zeros(written):
         look(path)
 
 
+@pytest.mark.parametrize("short", ["frames", "series"])
+def test_what_ends_before_others_along_a_dimension_that_grows_is_no_zeros(written, short):
+    """As netCDF's own library leaves it where it was killed between two variables of a series that was appended."""
+
+    def fill(file):
+        count = {"frames": 3, "series": 3} | {short: 2}
+        series = file.create_dataset("series", data=np.arange(count["series"]), maxshape=(None,), chunks=(1,))
+        series.make_scale("series")
+        frames = np.full((count["frames"], 4), 7, dtype="u2")
+        frames = file.create_dataset("frames", data=frames, maxshape=(None, 4), chunks=(1, 4))
+        frames.dims[0].attach_scale(series)
+
+    path = written(fill)
+    with pytest.raises(
+        DataError,
+        match=rf"data\.nc: the variable '{short}' holds 2 of its 3 places along series: .* would read as 0",
+    ):
+        look(path)
+
+
 def test_what_says_itself_that_it_is_missing_is_read(written):
     """NaN, the fill value that the attribute names; and what has no numbers: dimensions, marks, empty arrays."""
 
@@ -110,7 +130,8 @@ def test_what_says_itself_that_it_is_missing_is_read(written):
         file.create_dataset("of_matlab", shape=(4,), dtype="f8", chunks=(1,)).attrs["MATLAB_class"] = (
             b"double"
         )
-        file.create_dataset("crs", shape=(), dtype="i4")
+        file.create_dataset("crs", shape=(), dtype="i4").attrs["NAME"] = "WGS 84"
+        file.create_dataset("named", data=np.arange(4)).attrs["NAME"] = "a name of its own"
         file.create_dataset("none", shape=(0,), dtype="i4", maxshape=(None,), chunks=(4,))
         file.create_dataset("x", shape=(4,), dtype=">f4").make_scale(
             "This is a netCDF dimension but not a netCDF variable.         4"

@@ -104,7 +104,7 @@ def declared_bytes(path: str, groups: Sequence[str]) -> int:
         for name in groups:
             if name != "/" and not isinstance(file.get(name, getlink=True), h5py.HardLink):
                 raise LookupError(f"there is no group {name!r} in it")
-            group = file[name]
+            group, arrays = file[name], []
             _check_attributes(group, f"the group {name!r}", size)
             for key, item in _members(group):
                 if isinstance(item, h5py.Dataset):
@@ -112,6 +112,8 @@ def declared_bytes(path: str, groups: Sequence[str]) -> int:
                     _check_attributes(item, f"the variable {key!r}", size)
                     total += bytes_of
                     unwritten = unwritten or _unwritten(item, key)
+                    arrays.append((key, item))
+            unwritten = unwritten or _too_short(arrays)
     if total > most:
         raise RefusedError(
             f"its variables declare {amount(total)} together, but the file has {amount(size)}: it is damaged"
@@ -162,15 +164,10 @@ def _unwritten(array: Any, name: str) -> str:
     Of one without chunks it is known only if all are missing.
     """
     import h5py
-    import numpy as np
 
     shape = array.shape or ()
-    # a number alone, and a dimension without numbers, need not be written; MATLAB means 0 by what is not
-    if not shape or 0 in shape or array.dtype.kind not in "iufb" or "MATLAB_class" in array.attrs:
-        return ""
-    if bytes(array.attrs.get("NAME", b"")).startswith(
-        b"This is a netCDF dimension but not a netCDF variable"
-    ):
+    # a number alone, and a dimension without numbers, need not be written
+    if not shape or 0 in shape or not _has_numbers(array):
         return ""
     layout = array.id.get_create_plist().get_layout()
     if layout == h5py.h5d.CHUNKED:
@@ -181,12 +178,47 @@ def _unwritten(array: Any, name: str) -> str:
         held = 0 if array.id.get_space_status() == h5py.h5d.SPACE_STATUS_NOT_ALLOCATED else needed
     else:
         return ""
+    return _told_unwritten(array, name, held, needed, what) if held < needed else ""
+
+
+def _too_short(arrays: Sequence[tuple[str, Any]]) -> str:
+    """The same of arrays that end before others along a dimension that grows: netCDF fills up what is not there."""
+    found = []
+    longest: dict[str, int] = {}
+    for name, array in arrays:
+        growing = [axis for axis, most in enumerate(array.maxshape or ()) if most is None]
+        for axis in growing:
+            # the numbers of a dimension are along themselves
+            own = array.is_scale or not len(array.dims[axis])
+            scale = array if own else array.dims[axis][0]
+            longest[scale.name] = max(longest.get(scale.name, 0), scale.shape[0], array.shape[axis])
+            found.append((name, array, array.shape[axis], scale.name))
+    for name, array, length, scale in found:
+        if length < longest[scale] and _has_numbers(array):
+            what = f"places along {scale.rpartition('/')[2]}"
+            if said := _told_unwritten(array, name, length, longest[scale], what):
+                return said
+    return ""
+
+
+def _has_numbers(array: Any) -> bool:
+    """Whether an array has numbers that mean something where they were not written; MATLAB means 0 by it."""
+    try:
+        kind = array.dtype.kind
+    except TypeError:  # what NumPy has no type for
+        return False
+    name = array.attrs.get("NAME", b"")
+    of_dimension = isinstance(name, bytes) and name.startswith(b"This is a netCDF dimension but not a netCDF")
+    return kind in "iufb" and "MATLAB_class" not in array.attrs and not of_dimension
+
+
+def _told_unwritten(array: Any, name: str, held: int, needed: int, what: str) -> str:
+    """What to say of it; empty where the fill value says by itself that nothing is there."""
+    import numpy as np
+
     fill = array.fillvalue
-    if held >= needed or fill != fill:
-        return ""
-    if any(
-        fill in np.ravel(array.attrs[key]) for key in ("_FillValue", "missing_value") if key in array.attrs
-    ):
+    said = [array.attrs[key] for key in ("_FillValue", "missing_value") if key in array.attrs]
+    if fill != fill or any(fill in np.ravel(value) for value in said):
         return ""
     return (
         f"the variable {name!r} holds {held} of its {needed} {what}: the others were never written and would read as "

@@ -83,8 +83,8 @@ class ConvertedFrames:
         except DataError as error:
             raise DataError(f"series {self.names[series]!r}: {error}") from None
         self._count(raw)
-        blank = ~raw.any(axis=(-2, -1))
-        self._blank[series] = self._blank.get(series, blank) & blank
+        blank = np.asarray(~raw.any(axis=(-2, -1)))
+        self._blank[series] = np.logical_and(self._blank.get(series, blank), blank)
         if raw.ndim == 4:
             self._repeats.setdefault(series, _Repeats(raw.shape[:2])).add(raw)
         return raw
