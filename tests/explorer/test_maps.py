@@ -365,6 +365,18 @@ def test_without_a_map():
 
 
 @pytest.mark.slow
+def test_data_of_other_places_are_not_shown_with_a_map():
+    """Rows from the bottom beside a map with rows from the top."""
+    rows = np.arange(SHAPE[0])
+    found = parameter_map().assign_coords(y=rows)
+    for y, there in ((rows, True), (rows[::-1], False)):
+        data = DatasetSource(pixel_data().assign_coords(y=y))
+        said = map_pixels.data_in_words(
+            "paint", Workspace(maps=[("paint", found)], pictures=[("data", data)])
+        )
+        assert said == "" if there else said.startswith("What was measured here is not known")
+
+
 def test_data_of_pixels_that_are_dropped_say_where_they_belong(tmp_path):
     from pbrdf.explorer.upload_process import _opened
 

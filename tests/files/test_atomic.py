@@ -132,3 +132,13 @@ def test_a_new_folder_is_one_that_is_not_there_or_empty(tmp_path):
             require_new_folder(tmp_path / name)
     with pytest.raises(DataError, match="something of that name already"):
         require_new_folder(tmp_path)
+
+
+def test_a_file_in_a_folder_that_is_being_written_is_told_by_the_name_that_it_would_have_got(tmp_path):
+    with (
+        pytest.raises(DataError) as told,
+        atomic_folder(tmp_path / "run") as folder,
+        atomic_file(folder / "a.txt"),
+    ):
+        raise OSError(28, "No space left on device")
+    assert str(told.value) == f"{tmp_path / 'run' / 'a.txt'}: cannot be written: No space left on device"

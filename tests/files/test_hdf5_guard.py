@@ -77,6 +77,69 @@ def test_many_arrays_that_are_too_much_together_are_refused(written):
         look(written(fill))
 
 
+@pytest.mark.parametrize(("kind", "fill"), [("u2", None), ("f8", None), ("i1", 3)])
+def test_chunks_that_were_never_written_are_no_numbers(written, kind, fill):
+    def half(file):
+        array = file.create_dataset("frames", shape=(4, 5), dtype=kind, chunks=(1, 5), fillvalue=fill)
+        array[:3] = 7
+
+    path = written(half)
+    with h5py.File(path) as file:
+        assert file["frames"][3, 0] == (fill or 0)
+    with pytest.raises(
+        DataError,
+        match=rf"data\.nc: the variable 'frames' holds 3 of its 4 chunks: .* would read as {fill or 0}",
+    ):
+        look(path)
+
+
+def test_an_array_without_chunks_that_was_never_written_is_no_zeros(written):
+    path = written(lambda file: file.create_dataset("frames", shape=(4, 5), dtype="u2"))
+    with pytest.raises(DataError, match="the variable 'frames' holds 0 of its 20 values"):
+        look(path)
+
+
+@pytest.mark.parametrize("short", ["frames", "series"])
+def test_what_ends_before_others_along_a_dimension_that_grows_is_no_zeros(written, short):
+    """As netCDF's own library leaves it where it was killed between two variables of a series that was appended."""
+
+    def fill(file):
+        count = {"frames": 3, "series": 3} | {short: 2}
+        series = file.create_dataset("series", data=np.arange(count["series"]), maxshape=(None,), chunks=(1,))
+        series.make_scale("series")
+        frames = np.full((count["frames"], 4), 7, dtype="u2")
+        frames = file.create_dataset("frames", data=frames, maxshape=(None, 4), chunks=(1, 4))
+        frames.dims[0].attach_scale(series)
+
+    path = written(fill)
+    with pytest.raises(
+        DataError,
+        match=rf"data\.nc: the variable '{short}' holds 2 of its 3 places along series: .* would read as 0",
+    ):
+        look(path)
+
+
+def test_what_says_itself_that_it_is_missing_is_read(written):
+    """NaN, the fill value that the attribute names; and what has no numbers: dimensions, marks, empty arrays."""
+
+    def fill(file):
+        file.create_dataset("nan", shape=(4,), dtype="f8", chunks=(1,), fillvalue=np.nan)
+        for name in ("_FillValue", "missing_value"):
+            said = file.create_dataset(name, shape=(4,), dtype="i2", chunks=(1,), fillvalue=-1)
+            said.attrs[name] = np.array([-1], dtype="i2")
+        file.create_dataset("of_matlab", shape=(4,), dtype="f8", chunks=(1,)).attrs["MATLAB_class"] = (
+            b"double"
+        )
+        file.create_dataset("crs", shape=(), dtype="i4").attrs["NAME"] = "WGS 84"
+        file.create_dataset("named", data=np.arange(4)).attrs["NAME"] = "a name of its own"
+        file.create_dataset("none", shape=(0,), dtype="i4", maxshape=(None,), chunks=(4,))
+        file.create_dataset("x", shape=(4,), dtype=">f4").make_scale(
+            "This is a netCDF dimension but not a netCDF variable.         4"
+        )
+
+    look(written(fill))
+
+
 def test_what_packs_well_is_not_refused(written):
     path = written(lambda file: file.create_dataset("I", data=np.zeros(4_000_000), compression="gzip"))
     assert path.stat().st_size < 200_000

@@ -104,7 +104,8 @@ def test_other_arrays_are_listed(saved, content):
 def test_a_size_that_the_file_cannot_hold_is_seen_before_it_is_allocated(tmp_path, count, words):
     path = tmp_path / "a.mat"
     with h5py.File(path, "w", userblock_size=512) as file:
-        file.create_dataset("x", (1, count), "f8", chunks=(1, 10**5))  # nothing of it is written
+        x = file.create_dataset("x", (1, count), "f8", chunks=(1, 10**5))  # nothing of it is written
+        x.attrs["MATLAB_class"] = np.bytes_("double")
     with path.open("r+b") as file:
         file.write(b"MATLAB 7.3 MAT-file")
     with pytest.raises(DataError, match=words):

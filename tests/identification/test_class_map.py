@@ -16,6 +16,7 @@ from pbrdf.identification.conformal import calibrate
 from pbrdf.identification.identify import identify
 from pbrdf.identification.library import Library, bundled_library
 from pbrdf.identification.material import material_from_model
+from pbrdf.inversion.parameter_map import PENDING
 
 ANGLES = [
     np.radians([30.0, 30.0, 30.0, 50.0, 50.0, 50.0, 65.0, 65.0, 65.0]),
@@ -138,6 +139,18 @@ def test_pixels_that_are_not_measured():
     assert (found["material"].values[1] != NOT_MEASURED).all()
     assert np.isnan(found["probability"].values[:, 0]).all()
     assert not found["in_set"].values[:, 0].any()
+
+
+def test_pixels_that_are_not_yet_fitted_are_not_taken_for_pixels_without_data():
+    ds, _ = parameter_map((2, 6))
+    whole = identify_map(ds, LIBRARY)
+    ds["status"][1, 2] = PENDING
+    ds["estimate"][:, 1, 2] = np.nan
+    with pytest.raises(DataError, match=r"this map is not complete: .* not yet fitted .* by a variable mask"):
+        identify_map(ds, LIBRARY)
+    done = ds["status"] != PENDING
+    found = identify_map(ds.assign(mask=done), LIBRARY)["material"]
+    np.testing.assert_array_equal(found, whole["material"].where(done, NOT_MEASURED))
 
 
 def test_a_parameter_on_a_bound_says_nothing():

@@ -116,3 +116,16 @@ def test_the_image_of_a_map():
     data = xr.Dataset({"Q": (("y", "geometry", "x"), np.zeros((2, 3, 4)))})
     assert dict(image_of(data).sizes) == {"y": 2, "x": 4}
     assert dict(image_of(xr.Dataset({"estimate": (("parameter", "z"), np.zeros((2, 5)))})).sizes) == {"z": 5}
+
+
+def test_labels_of_other_pixels_are_refused_with_both(tmp_path):
+    image = FOUND.assign_coords(y=[0, 1], x=range(4))
+    turned = labels([[1, 1, 2, 2], [0, 1, 1, 7]]).assign_coords(y=[1, 0])
+    with pytest.raises(
+        DataError, match="y is 1, 0 in the labels, and 0, 1 in the map: these are not the same"
+    ):
+        judge_pixels(image, turned)
+    turned.rename("labels").to_netcdf(tmp_path / "labels.nc", engine="h5netcdf")
+    with pytest.raises(DataError, match=r"y is 1, 0 in .*labels\.nc, and 0, 1 in the image"):
+        read_material_labels(tmp_path / "labels.nc", image["material"])
+    assert judge_pixels(FOUND, turned).counts.sum() > 0

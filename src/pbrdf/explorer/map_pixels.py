@@ -7,11 +7,13 @@ from __future__ import annotations
 
 import json
 import re
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from pbrdf.data.alignment import require_same_labels
 from pbrdf.data.schema import COORDINATES, COVARIANCE, DIMENSION, STOKES_AXES, VARIABLES, std_name
 from pbrdf.data.select import measured_channels
 from pbrdf.data.validation import validate
@@ -98,14 +100,19 @@ def data_in_words(name: str, workspace: Workspace) -> str:
 
 
 def _beside(name: str, workspace: Workspace) -> MapSource | None:
-    """Data that were opened beside a map and have its pixels."""
+    """Data that were opened beside a map and have its pixels, which stand at the same places."""
     dataset = dict(reversed(workspace.maps))[name]
     wanted = {dim: dataset.sizes[dim] for dim in dims_of(dataset)}
     for _, source in workspace.pictures:
-        # the outline of files reads a pixel of each
-        sizes = source.sizes if isinstance(source, PictureSource) else source.outline().sizes
+        if isinstance(source, PictureSource):
+            sizes, places = source.sizes, source.places
+        else:
+            places = source.outline()
+            sizes = {str(dim): size for dim, size in places.sizes.items()}
         if all(sizes.get(dim) == size for dim, size in wanted.items()):
-            return source
+            with suppress(DataError):
+                require_same_labels(places, "the data", dataset, "the map", wanted)
+                return source
     return None
 
 
@@ -148,7 +155,13 @@ def _are_others(dataset: xr.Dataset, source: MapSource) -> bool:
         stored = json.loads(str(dataset.attrs["map_settings"]))["input"]["files"]
     except (KeyError, TypeError, ValueError):
         return False
-    return bool(stored != json.loads(json.dumps(source.identity()))["files"])
+    found = json.loads(json.dumps(source.identity()))["files"]
+    if len(found) != len(stored):
+        return True
+    # what a map of a former version does not say of them cannot differ
+    return any(
+        own.get(key) != told for own, one in zip(found, stored, strict=True) for key, told in one.items()
+    )
 
 
 def _measured_at(name: str, indices: dict[str, int], workspace: Workspace) -> xr.Dataset:

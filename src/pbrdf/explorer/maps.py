@@ -255,6 +255,8 @@ class ChosenMap:
     def _states(self) -> tuple[np.ndarray, list[str]]:
         """What became of the pixels, as places in a list of names, the last of which is that nobody came yet."""
         codes, (words, known) = self._read("status"), _meanings(self.dataset["status"], "flag_values")
+        known = [code for word, code in zip(words, known, strict=True) if word != PENDING]
+        words = [word for word in words if word != PENDING]
         found = np.full(codes.shape, float(len(words)))
         for k, code in enumerate(known):
             found[codes == code] = k
@@ -312,8 +314,9 @@ class ChosenMap:
                     "note": "; ".join(notes),
                 }
             )
-        freedom, chi2 = int(found["degrees_of_freedom"]), float(found["chi2"])
+        chi2 = float(found["chi2"])
         if math.isfinite(chi2):
+            freedom = int(found["degrees_of_freedom"])
             reduced = f" = {brief(chi2 / freedom, 3)}" if freedom else ""
             content["facts"] = [["χ² / degrees of freedom", f"{brief(chi2)} / {freedom}{reduced}"]]
         return content
@@ -370,7 +373,10 @@ def _meanings(array: xr.DataArray, numbers: str) -> tuple[list[str], list[int]]:
 
 
 def _masks(dataset: xr.Dataset) -> dict[str, int]:
-    return dict(zip(*_meanings(dataset["flags"], "flag_masks"), strict=True))
+    """Bits of what limits a parameter, by name."""
+    found = dict(zip(*_meanings(dataset["flags"], "flag_masks"), strict=True))
+    found.pop(PENDING, None)
+    return found
 
 
 def variables_of(dataset: xr.Dataset) -> list[Variable]:

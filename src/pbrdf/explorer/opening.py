@@ -89,14 +89,9 @@ def _is_fit(path: Path) -> bool:
 def _map(path: Path) -> xr.Dataset | None:
     """The map in a store or a file, None if something else is in it."""
     if path.is_dir():
-        from pbrdf.inversion.map_store import open_map
-        from pbrdf.inversion.map_store.map_store import stored_attributes
+        from pbrdf.inversion import map_store
 
-        try:
-            stored_attributes(path)
-        except DataError:
-            return None
-        return open_map(path, partial=True)
+        return map_store.open_map(path, partial=True) if map_store.is_map(path) else None
     if path.suffix.lower() != ".nc":
         return None
     from pbrdf.files.netcdf_files import open_netcdf

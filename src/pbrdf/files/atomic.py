@@ -432,7 +432,14 @@ def _move(folder: Path, target: Path) -> None:
 
 
 def _not_written(path: Path, error: OSError) -> DataError:
-    return DataError(f"{path}: cannot be written: {error.strerror or error}")
+    """What to say of a file or folder, by the name that it would have got: a hidden folder is left out of it."""
+    parts = path.parts
+    shown = [
+        part
+        for part, inside in itertools.zip_longest(parts, parts[1:])
+        if not re.fullmatch(rf"\.{re.escape(inside or '')}\.[0-9a-f]{{8}}\.tmp", part)
+    ]
+    return DataError(f"{Path(*shown)}: cannot be written: {error.strerror or error}")
 
 
 def _remove(folder: Path) -> None:

@@ -6,6 +6,9 @@ that it starts quickly; :mod:`pbrdf.files.hdf5_guard` starts it, asks it, and en
 
 Nothing is allocated before it is compared with the size of the file: deflate, the strongest common filter, packs at
 most 1032 bytes into one, so a file that declares far more than that holds next to nothing of what it declares.
+
+Numbers that were never written read as the fill value, which is 0 where nothing else is said: an array with such chunks
+is refused, unless its fill value says that nothing is there (NaN, or CF's ``_FillValue``).
 """
 
 from __future__ import annotations
@@ -89,28 +92,34 @@ def declared_bytes(path: str, groups: Sequence[str]) -> int:
     Raises
     ------
     RefusedError
-        If an array, its chunks or an attribute is larger than the file can hold, or kept in another file.
+        If an array, its chunks or an attribute is larger than the file can hold, or kept in another file; or an array
+        was not written as a whole.
     """
     import h5py
 
     size = os.path.getsize(path)  # noqa: PTH202  no import that is not needed
     most = max(ALWAYS_ALLOWED, MOST_TIMES_ITS_SIZE * size)
-    total = 0
+    total, unwritten = 0, ""
     with h5py.File(path, "r") as file:
         for name in groups:
             if name != "/" and not isinstance(file.get(name, getlink=True), h5py.HardLink):
                 raise LookupError(f"there is no group {name!r} in it")
-            group = file[name]
+            group, arrays = file[name], []
             _check_attributes(group, f"the group {name!r}", size)
             for key, item in _members(group):
                 if isinstance(item, h5py.Dataset):
                     bytes_of = _check_array(item, key, most)
                     _check_attributes(item, f"the variable {key!r}", size)
                     total += bytes_of
+                    unwritten = unwritten or _unwritten(item, key)
+                    arrays.append((key, item))
+            unwritten = unwritten or _too_short(arrays)
     if total > most:
         raise RefusedError(
             f"its variables declare {amount(total)} together, but the file has {amount(size)}: it is damaged"
         )
+    if unwritten:
+        raise RefusedError(unwritten)
     return total
 
 
@@ -147,6 +156,75 @@ def _check_array(array: Any, name: str, most: int) -> int:
             "this size cannot hold: it is damaged"
         )
     return declared
+
+
+def _unwritten(array: Any, name: str) -> str:
+    """What to say of an array whose missing numbers would be read as the fill value; empty if there are none.
+
+    Of one without chunks it is known only if all are missing.
+    """
+    import h5py
+
+    shape = array.shape or ()
+    # a number alone, and a dimension without numbers, need not be written
+    if not shape or 0 in shape or not _has_numbers(array):
+        return ""
+    layout = array.id.get_create_plist().get_layout()
+    if layout == h5py.h5d.CHUNKED:
+        needed = math.prod(-(-length // chunk) for length, chunk in zip(shape, array.chunks, strict=True))
+        held, what = array.id.get_num_chunks(), "chunks"
+    elif layout == h5py.h5d.CONTIGUOUS:
+        needed, what = math.prod(shape), "values"
+        held = 0 if array.id.get_space_status() == h5py.h5d.SPACE_STATUS_NOT_ALLOCATED else needed
+    else:
+        return ""
+    return _told_unwritten(array, name, held, needed, what) if held < needed else ""
+
+
+def _too_short(arrays: Sequence[tuple[str, Any]]) -> str:
+    """The same of arrays that end before others along a dimension that grows: netCDF fills up what is not there."""
+    found = []
+    longest: dict[str, int] = {}
+    for name, array in arrays:
+        growing = [axis for axis, most in enumerate(array.maxshape or ()) if most is None]
+        for axis in growing:
+            # the numbers of a dimension are along themselves
+            own = array.is_scale or not len(array.dims[axis])
+            scale = array if own else array.dims[axis][0]
+            longest[scale.name] = max(longest.get(scale.name, 0), scale.shape[0], array.shape[axis])
+            found.append((name, array, array.shape[axis], scale.name))
+    for name, array, length, scale in found:
+        if length < longest[scale] and _has_numbers(array):
+            what = f"places along {scale.rpartition('/')[2]}"
+            if said := _told_unwritten(array, name, length, longest[scale], what):
+                return said
+    return ""
+
+
+def _has_numbers(array: Any) -> bool:
+    """Whether an array has numbers that mean something where they were not written; MATLAB means 0 by it."""
+    try:
+        kind = array.dtype.kind
+    except TypeError:  # what NumPy has no type for
+        return False
+    name = array.attrs.get("NAME", b"")
+    of_dimension = isinstance(name, bytes) and name.startswith(b"This is a netCDF dimension but not a netCDF")
+    return kind in "iufb" and "MATLAB_class" not in array.attrs and not of_dimension
+
+
+def _told_unwritten(array: Any, name: str, held: int, needed: int, what: str) -> str:
+    """What to say of it; empty where the fill value says by itself that nothing is there."""
+    import numpy as np
+
+    fill = array.fillvalue
+    said = [array.attrs[key] for key in ("_FillValue", "missing_value") if key in array.attrs]
+    if fill != fill or any(fill in np.ravel(value) for value in said):
+        return ""
+    return (
+        f"the variable {name!r} holds {held} of its {needed} {what}: the others were never written and would read as "
+        f"{fill}. If the program that writes the file was interrupted, run it again; if nothing is to stand there, "
+        "give the variable the attribute _FillValue"
+    )
 
 
 def _check_attributes(item: Any, name: str, size: int) -> None:

@@ -84,7 +84,8 @@ def identify_map(
     Raises
     ------
     FitError, DataError
-        If the library is empty or of another model, an option is none, or the data are neither form.
+        If the library is empty or of another model, an option is none, or the data are neither form; or if pixels of a
+        map are not yet fitted that no ``mask`` leaves out.
     """
     check_request(library, confidence)
     if not (math.isfinite(smoothing) and smoothing >= 0.0):

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pbrdf.data.alignment import require_same_labels
 from pbrdf.data.schema import DIMENSION, STOKES_AXES, VARIABLES
 from pbrdf.errors import DataError
 from pbrdf.identification.class_map import NOT_MEASURED
@@ -60,6 +61,7 @@ def read_material_labels(path: Path, like: xr.DataArray) -> xr.DataArray:
         found = _variable(path)
         if set(found.dims) != set(like.dims) or found.transpose(*like.dims).shape != like.shape:
             raise DataError(f"{path}: {found.name} is over {_shape(found)}, the image over {_shape(like)}")
+        require_same_labels(found, str(path), like, "the image", map(str, like.dims))
         return found.transpose(*like.dims)
     if kind == ".npy":
         array = _array(path)
@@ -94,9 +96,10 @@ def judge_pixels(found: xr.Dataset, labels: xr.DataArray) -> Confusion:
     Raises
     ------
     DataError
-        If no pixel that was measured has a label.
+        If no pixel that was measured has a label, or the labels are of other pixels.
     """
     image = found["material"]
+    require_same_labels(labels, "the labels", image, "the map", map(str, image.dims))
     names = [str(name) for name in found["material_name"].values]
     truth, strangers = _numbered(labels.transpose(*image.dims), names)
     judged = (truth >= 0) & (image.values != NOT_MEASURED)

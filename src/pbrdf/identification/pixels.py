@@ -23,7 +23,7 @@ from pbrdf.identification.shared_geometry import SharedGeometry
 from pbrdf.inversion.noise import Noise
 from pbrdf.inversion.observations import Observations
 from pbrdf.inversion.parameter_map.block_stack import ANGLES, stack_of_block
-from pbrdf.inversion.parameter_map.layout import PixelStatus
+from pbrdf.inversion.parameter_map.layout import PENDING, PixelStatus
 from pbrdf.optics.stokes import STOKES
 
 if TYPE_CHECKING:
@@ -77,10 +77,16 @@ def of_parameters(dataset: xr.Dataset, dims: Sequence[str], materials: Sequence[
 
         estimate, error = (read(name, "parameter")[order].T for name in ("estimate", "standard_error"))
         known = np.isfinite(estimate).any(axis=1)
+        wanted = read("mask") != 0 if "mask" in block else np.ones(len(known), dtype=bool)
         if "status" in block:
-            known &= read("status") == PixelStatus.CONVERGED
-        if "mask" in block:
-            known &= read("mask") != 0
+            status = read("status")
+            if (wanted & (status == PENDING)).any():
+                raise DataError(
+                    "this map is not complete: there are pixels that are not yet fitted (status -1), which are not the "
+                    "same as those without data. Go on with `pbrdf map`, or leave them out by a variable mask"
+                )
+            known &= status == PixelStatus.CONVERGED
+        known &= wanted
         estimate, error = estimate[known].astype(float), error[known].astype(float)
         limited = ~np.isfinite(estimate)
         if "flags" in block:

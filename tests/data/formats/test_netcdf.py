@@ -138,3 +138,28 @@ def test_pictures_pixels_and_maps_say_what_takes_them(tmp_path, dims, name, word
     xr.Dataset({name: (dims, np.ones((2,) * len(dims)))}).to_netcdf(tmp_path / "a.nc", engine="h5netcdf")
     with pytest.raises(DataError, match=rf"a\.nc: holds {words}"):
         read_netcdf(tmp_path / "a.nc")
+
+
+@pytest.mark.parametrize("order", ["IUQV", "VUQI"])
+def test_stokes_components_are_found_by_their_labels(tmp_path, order):
+    rng = np.random.default_rng(5)
+    matrices = rng.uniform(-0.1, 0.1, (3, 4, 4))
+    matrices[:, 0, 0] = 1.0
+    spread = np.eye(4) + 0.1 * np.add.outer(np.arange(4), np.arange(4))
+    for ds, axes in (
+        (
+            make_dataset([0.1, 0.2, 0.3], 0.2, 0.0, quantity="brdf", mueller=matrices),
+            ("stokes_out", "stokes_in"),
+        ),
+        (
+            make_dataset(
+                [0.1, 0.2], 0.2, 0.0, quantity="brdf", I=1.0, Q=0.1, U=0.2, V=0.0, covariance=spread
+            ),
+            ("stokes_row", "stokes_column"),
+        ),
+    ):
+        write_netcdf(ds, tmp_path / "data.nc")
+        with xr.open_dataset(tmp_path / "data.nc", engine="h5netcdf") as stored:
+            other = stored.sel({axis: list(order) for axis in axes}).load()
+        other.to_netcdf(tmp_path / "other.nc", engine="h5netcdf")
+        assert same_bits(read_netcdf(tmp_path / "other.nc"), ds)

@@ -199,3 +199,37 @@ def test_means_need_their_number():
 def test_advice_on_numbers_out_of_range(numbers, detector, message):
     with pytest.raises(DataError, match=message):
         require_range(numbers, Detector(**detector))
+
+
+@pytest.mark.parametrize("repeats", [1, 2])
+def test_pictures_of_nothing_but_zero_are_told(repeats):
+    """As the end of a stack reads that was made first and filled until its writer was killed."""
+    numbers = np.random.default_rng(6).integers(80, 3000, (3, repeats, 4, 30, 20)).astype(np.uint16)
+    whole = ConvertedFrames(Repeated(numbers), Detector(bits=12))
+    numbers = numbers.copy()
+    numbers[1, -1, 3] = numbers[2] = 0
+    numbers[0, :, 0, :15] = 0  # half a picture may be dark
+    half = ConvertedFrames(Repeated(numbers), Detector(bits=12))
+    black = ConvertedFrames(Repeated(np.zeros_like(numbers)), Detector(bits=12))
+    for frames in (whole, half, black):
+        for series in range(3):
+            for row in (0, 15):
+                frames.read(series, row, row + 15)
+    assert not [note for note in (*whole.notes, *black.notes) if "0 at every pixel" in note]
+    (told,) = [note for note in half.notes if "0 at every pixel" in note]
+    assert told.startswith(
+        "0 at every pixel that was read: state 4 of the series '2', state 1 of the series '3', state 2 of the series "
+        f"'3' and {1 + 4 * repeats - 3} more. If the camera saw light"
+    )
+
+
+class Repeated:
+    """Frames of an array (series, repeat, state, row, column)."""
+
+    def __init__(self, array):
+        self.array, self.names = array, tuple("123")
+        _, self.layers, self.states, self.rows, self.columns = array.shape
+
+    def read(self, series, first_row, last_row):
+        part = self.array[series, :, :, first_row:last_row]
+        return part if self.layers > 1 else part[0]

@@ -8,8 +8,10 @@ import tifffile
 import xarray as xr
 from PIL import Image
 
+from pbrdf.data.formats.zarr_folder import create_zarr
 from pbrdf.errors import DataError
 from pbrdf.instruments.frames.frame_files import open_frames
+from pbrdf.instruments.frames.frame_grids import open_grid
 from pbrdf.instruments.polarimeter.detector import Detector
 from pbrdf.instruments.polarimeter.instrument import Instrument
 from pbrdf.instruments.polarimeter.polarimeter import division_of_focal_plane, rotating_polarizer
@@ -181,6 +183,75 @@ def test_netcdf_and_zarr(tmp_path, numbers, kind):
         renamed = gridded(numbers).assign_coords(state=["a", "b", "c", "d"])
         renamed.to_netcdf(tmp_path / "other.nc", engine="h5netcdf")
         open_frames(tmp_path / "other.nc", polarizer())
+
+
+@pytest.mark.parametrize(
+    ("labels", "units"),
+    [
+        ([0.0, 45.0, 90.0, 135.0], "degree"),
+        ([0, 45, 90, 135], None),
+        (np.deg2rad([0.0, 45.0, 90.0, 135.0]), "rad"),
+        ([0, 1, 2, 3], None),
+        ([1, 2, 3, 4], None),
+        (["0.0", "45.0", "90.0", "135.0"], None),
+    ],
+)
+@pytest.mark.parametrize("order", [[0, 1, 2, 3], [0, 2, 1, 3], [3, 2, 1, 0]])
+def test_states_that_are_numbers_are_found_by_them_and_never_by_their_place(
+    tmp_path, numbers, labels, units, order
+):
+    file = gridded(numbers).assign_coords(state=("state", labels, {"units": units} if units else {}))
+    file.isel(state=order).to_netcdf(tmp_path / "run.nc", engine="h5netcdf")
+    np.testing.assert_array_equal(open_frames(tmp_path / "run.nc", polarizer()).read(1, 0, ROWS), numbers[1])
+
+
+def test_states_of_other_angles_are_refused_with_both(tmp_path, numbers):
+    file = gridded(numbers).assign_coords(state=[0.0, 60.0, 120.0, 150.0])
+    file.to_netcdf(tmp_path / "run.nc", engine="h5netcdf")
+    with pytest.raises(
+        DataError,
+        match=r"'0.0', '60.0', '120.0', '150.0', but those of the polarimeter '0', '45', '90', '135'",
+    ):
+        open_frames(tmp_path / "run.nc", polarizer())
+
+
+@pytest.mark.parametrize("kind", ["nc", "zarr"])
+def test_frames_that_are_not_finished_are_no_dark_pictures(tmp_path, numbers, kind):
+    """What was never written reads as the fill value: 0, unless the file says that this is none."""
+    path = tmp_path / f"run.{kind}"
+    if kind == "nc":
+        import h5netcdf
+
+        with h5netcdf.File(path, "w") as file:
+            file.dimensions = {"series": 2, "state": 4, "y": ROWS, "x": COLUMNS}
+            frames = file.create_variable(
+                "frames", ("series", "state", "y", "x"), "u2", chunks=(1, 1, ROWS, COLUMNS)
+            )
+            frames[0] = numbers[0]
+        with pytest.raises(DataError, match=r"run\.nc: the variable 'frames' holds 4 of its 8 chunks"):
+            open_frames(path, polarizer())
+    else:
+        zarr = pytest.importorskip("zarr")
+        create_zarr(gridded(numbers), path)
+        group = zarr.open_group(path, mode="r+", zarr_format=3, use_consolidated=False)
+        group["frames"].resize((3, 4, ROWS, COLUMNS))
+        with pytest.raises(DataError, match=r"the chunk frames/c/.* is missing"):
+            open_frames(path, polarizer())
+    # said to be none
+    marked = tmp_path / f"marked.{kind}"
+    file = gridded(numbers)
+    file["frames"][1, 2, 3, 4] = 65535
+    encoding = {"frames": {"_FillValue": 65535}}
+    if kind == "nc":
+        file.to_netcdf(marked, engine="h5netcdf", encoding=encoding)
+    else:
+        create_zarr(file, marked, encoding=encoding)
+    grid = open_grid(marked, STATES)
+    np.testing.assert_array_equal(grid.read(0, 0, ROWS), numbers[0])
+    with pytest.raises(
+        DataError, match=r"1 pixels of the series '.*' are 65535, the _FillValue of frames, which"
+    ):
+        grid.read(1, 0, ROWS)
 
 
 def test_netcdf_with_geometry_for_series_and_without_names(tmp_path, numbers):

@@ -154,3 +154,20 @@ def test_chunks_of_dask_arrays_are_computed_once(noisy):
     found = as_geometries(lazy)["sample"]
     assert calls == [sizes]
     xr.testing.assert_identical(found, as_geometries(noisy)["sample"])
+
+
+def test_dimensions_and_components_go_by_their_names(noisy):
+    """Angles over (x, y), covariances of V, U, Q, I: the same geometries."""
+    part = noisy.isel(y=slice(60, 120), x=slice(60, 120))
+    expected = as_geometries(part, bins=None, every=7)["sample"]
+    turned = part.transpose("x", "y", ...)
+    axes = [axis for axis in ("stokes_row", "stokes_column") if axis in part.coords]
+    assert axes
+    turned = turned.sel({axis: list("VUQI") for axis in axes})
+    xr.testing.assert_identical(as_geometries(turned, bins=None, every=7)["sample"], expected)
+
+
+def test_labels_of_other_pixels_are_refused_with_both(noisy):
+    labels = xr.DataArray(np.ones((240, 240), int), dims=("y", "x"), coords={"y": noisy["y"][::-1].values})
+    with pytest.raises(DataError, match=r"y is 239, 238, … 0 in the labels, and 0, 1, … 239 in the pictures"):
+        as_geometries(noisy, labels)

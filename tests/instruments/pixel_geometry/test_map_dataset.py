@@ -150,6 +150,16 @@ def test_lazy_pictures_stay_lazy(kind):
         xr.testing.assert_identical(map_block(pictures.isel(part), located), whole.isel(part))
 
 
+def test_a_geometry_of_other_pixels_is_refused_with_both():
+    pictures = blank(6, 5)
+    geometry = Sphere(x=2.5, y=3.0, r=2.0, lamps=[Lamp(0.5, 0.3)]).of(pictures)
+    assert map_dataset(pictures, geometry).sizes["geometry"] == 1
+    with pytest.raises(
+        DataError, match="x is 4, 3, 2, 1, 0 in the geometry, and 0, 1, 2, 3, 4 in the pictures"
+    ):
+        map_dataset(pictures, geometry.isel(x=slice(None, None, -1)))
+
+
 def test_one_geometry_serves_several_series_but_not_other_numbers():
     three = rich(10, 12, 3)
     found = map_dataset(three, Panel(0.5, 0.6, 0.3, 1.0))

@@ -96,3 +96,27 @@ def test_what_does_not_fit_is_said(tmp_path):
         AngleMaps(maps).of(blank(3, 4))
     with pytest.raises(DataError, match="there is no rotation"):
         AngleMaps(maps.drop_vars("rotation")).of(blank(3, 4))
+
+
+@pytest.mark.parametrize("components", ["xyz", "zxy", "yxz"])
+def test_components_of_normals_are_found_by_their_labels_and_dimensions_by_theirs(tmp_path, components):
+    stored = xr.Dataset({"normal": (("y", "x", "component"), normals())}, {"component": list("xyz")})
+    turned = stored.sel(component=list(components)).transpose("component", "x", "y")
+    turned.to_netcdf(tmp_path / "normals.nc", engine="h5netcdf")
+    geometry = NormalMap(normals=tmp_path / "normals.nc", lamps=[LAMP], camera=CAMERA).located(blank(30, 40))
+    found, ball = geometry.pixels(np.arange(40), np.arange(30)), BALL.of(blank(30, 40))
+    np.testing.assert_allclose(found["theta_i"], ball["theta_i"], atol=1e-9)
+    named = stored.assign_coords(component=["nx", "ny", "nz"])
+    named.to_netcdf(tmp_path / "named.nc", engine="h5netcdf")
+    with pytest.raises(DataError, match="the components of normal are nx, ny, nz: they must be x, y, z"):
+        NormalMap(normals=tmp_path / "named.nc", lamps=[LAMP]).located(blank(30, 40))
+
+
+def test_normals_and_angles_of_other_rows_are_refused_with_both(tmp_path):
+    stored = xr.Dataset({"normal": (("y", "x", "component"), normals())}, {"y": np.arange(30)[::-1]})
+    stored.to_netcdf(tmp_path / "normals.nc", engine="h5netcdf")
+    with pytest.raises(DataError, match=r"y is 29, 28, … 0 in the normals, and 0, 1, … 29 in the pictures"):
+        NormalMap(normals=tmp_path / "normals.nc", lamps=[LAMP]).located(blank(30, 40))
+    maps = BALL.of(blank(30, 40)).isel(x=slice(None, None, -1))
+    with pytest.raises(DataError, match=r"x is 39, 38, … 0 in the maps of angles, and 0, 1, … 39 in the"):
+        AngleMaps(maps).located(blank(30, 40))

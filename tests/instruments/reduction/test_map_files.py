@@ -1,6 +1,10 @@
 """The file of every pixel holds what the reduction found, as netCDF and as Zarr."""
 
 import json
+import signal
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,6 +23,7 @@ from pbrdf.instruments.polarimeter.retardance_sets import retardance_set
 from pbrdf.instruments.reduction.map_files import MapWriter
 from pbrdf.instruments.reduction.reduce import reduce
 from pbrdf.instruments.reduction.stokes_image import reduce_frames
+from pbrdf.instruments.reduction.streaming import reduced_blocks
 
 DETECTOR = Detector(bits=12, gain=3.0, read_noise=5.0, offset=60.0)
 
@@ -70,7 +75,7 @@ def test_what_was_found_is_read_back(tmp_path, frames, kind):
             assert file[name].dims == ("series", "y", "x")
             np.testing.assert_allclose(file[name].values[s], values, rtol=1e-6, atol=1e-6, err_msg=name)
     assert file["flags"].values[1, 7, 5] == 1
-    assert file["flags"].attrs["flag_meanings"] == "saturated dead dark"
+    assert file["flags"].attrs["flag_meanings"] == "saturated dead dark not_yet_reduced"
     assert np.isnan(file["I"].values[1, 7, 5])
     assert file["aolp"].attrs["units"] == "degree"
     assert json.loads(file.attrs["polarimeter"])["kind"] == "lcvr"
@@ -109,3 +114,73 @@ def test_angles_stand_beside_the_series(tmp_path, frames):
 def test_another_extension(tmp_path, frames):
     with pytest.raises(DataError, match=r"written as \.nc or \.zarr"):
         MapWriter(tmp_path / "stokes.tif", frames, Instrument(lcvr(retardance_set("tetrahedron")), DETECTOR))
+
+
+@pytest.mark.parametrize("kind", ["nc", "zarr"])
+def test_half_a_file_has_no_name_and_what_was_not_written_is_no_good_pixel(tmp_path, frames, kind):
+    if kind == "zarr":
+        pytest.importorskip("zarr")
+    instrument = Instrument(rotating_polarizer(np.deg2rad([0, 45, 90, 135])), DETECTOR)
+    path = tmp_path / f"stokes.{kind}"
+    writer = MapWriter(path, frames, instrument)
+
+    def half():
+        with writer:
+            for block, part in reduced_blocks(frames, instrument, lambda b: (b, writer.prepare(b))):
+                if block.series == 1:
+                    break
+                writer.add(block, part)
+            if kind == "nc":
+                writer._file.flush()
+            (hidden,) = tmp_path.iterdir()
+            assert hidden.name.startswith(f".stokes.{kind}.") and hidden.suffix == ".tmp"
+            options = {"nc": {"engine": "h5netcdf"}, "zarr": {"engine": "zarr", "consolidated": False}}
+            with xr.open_dataset(hidden / path.name, **options[kind]) as found:
+                assert found["flags"].dtype == np.uint8
+                assert (found["flags"].values[0] < 8).all() and np.isfinite(found["I"].values[0]).any()
+                assert (found["flags"].values[1] == 128).all() and np.isnan(found["I"].values[1]).all()
+                attrs = found["flags"].attrs
+                meanings = dict(zip(attrs["flag_masks"], attrs["flag_meanings"].split(), strict=True))
+                assert meanings[128] == "not_yet_reduced"
+            raise KeyError("the reduction fails")
+
+    with pytest.raises(KeyError):
+        half()
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of Unix")
+def test_what_a_kill_leaves_goes_with_the_next_reduction(tmp_path, frames):
+    code = (
+        "import os, sys; sys.path[:0] = sys.argv[2:]\n"
+        "from test_map_files import *\n"
+        "frames = ArrayFrames(np.full((2, 4, 300, 40), 900, dtype=np.uint16))\n"
+        "MapWriter.add = lambda *_: os.kill(os.getpid(), signal.SIGKILL)\n"
+        "written(Path(sys.argv[1]), lcvr(retardance_set('tetrahedron')), frames)\n"
+    )
+    path = tmp_path / "stokes.nc"
+    arguments = [sys.executable, "-c", code, str(path), str(Path(__file__).parent), *filter(None, sys.path)]
+    assert subprocess.run(arguments, check=False).returncode == -signal.SIGKILL
+    assert [file.name.startswith(".stokes.nc.") for file in tmp_path.iterdir()] == [True]
+    written(path, lcvr(retardance_set("tetrahedron")), frames)
+    assert [file.name for file in tmp_path.iterdir()] == ["stokes.nc"]
+
+
+def test_a_full_disk_is_told_by_the_name_of_the_file(tmp_path, frames, monkeypatch):
+    from pbrdf.files.netcdf_files import PatientFile
+
+    writer = MapWriter(
+        tmp_path / "stokes.nc", frames, Instrument(lcvr(retardance_set("tetrahedron")), DETECTOR)
+    )
+    made = PatientFile.__init__
+
+    def full(self, path):
+        made(self, path)
+        self.error = OSError(28, "No space left on device")
+
+    monkeypatch.setattr(PatientFile, "__init__", full)
+    with pytest.raises(DataError) as told, writer:
+        raise AssertionError("not reached")
+    assert str(told.value) == f"{tmp_path / 'stokes.nc'}: cannot be written: No space left on device"
+    assert not list(tmp_path.iterdir())

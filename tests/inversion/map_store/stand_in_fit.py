@@ -16,7 +16,9 @@ from pbrdf.inversion.map_store import DatasetSource, prepare_store, run_units
 
 SHARD, CHUNK = {"y": 16, "x": 16}, {"y": 8, "x": 8}
 PARAMETERS = ["first", "second", "third"]
-MEANINGS = "converged not_converged too_few_values failed not_measured masked"
+MEANINGS = "converged not_converged too_few_values failed not_measured masked not_yet_fitted"
+#: What stands for numbers of pixels that nobody has come to.
+UNDONE = {"optima": -1, "starts": -1, "flags": 128, "status": -1}
 VARIABLES = {
     "estimate": (("parameter",), np.float64),
     "standard_error": (("parameter",), np.float64),
@@ -45,7 +47,13 @@ class StandInFit:
         return tuple(self.sizes)
 
     def _assembled(self, arrays):
-        attrs = {"status": {"flag_values": np.arange(6, dtype=np.int8), "flag_meanings": MEANINGS}}
+        attrs = {
+            "status": {"flag_values": np.array([*range(6), -1], dtype=np.int8), "flag_meanings": MEANINGS},
+            "flags": {
+                "flag_masks": np.array([1, 128], dtype=np.uint8),
+                "flag_meanings": "high not_yet_fitted",
+            },
+        }
         return xr.Dataset(
             {
                 name: ((*VARIABLES[name][0], *self.dims), values, attrs.get(name, {}))
@@ -58,7 +66,10 @@ class StandInFit:
     def template(self):
         shapes = {name: (*(3,) * len(front), *self.sizes.values()) for name, (front, _) in VARIABLES.items()}
         return self._assembled(
-            {name: np.broadcast_to(VARIABLES[name][1](0), shapes[name]) for name in VARIABLES}
+            {
+                name: np.broadcast_to(VARIABLES[name][1](UNDONE.get(name, np.nan)), shapes[name])
+                for name in VARIABLES
+            }
         )
 
     def fit_block(self, block, progress=None):

@@ -31,10 +31,15 @@ def test_a_data_set_is_its_values_and_attributes():
     single = picture().astype(np.float32)
     assert changed(here, DatasetSource(single).identity()) == ["variables.I.digest", "variables.I.form"]
     named = picture().assign_coords(group=("geometry", list("abcde"))).assign_attrs(illumination=[1, 0, 0, 0])
-    assert changed(here, DatasetSource(named).identity()) == ["attributes.illumination", "variables.group"]
+    assert changed(here, DatasetSource(named).identity()) == [
+        "attributes.illumination",
+        "labels.group",
+        "variables.group",
+    ]
     renamed = named.assign_coords(group=("geometry", list("abcdf")))
     assert changed(DatasetSource(named).identity(), DatasetSource(renamed).identity()) == [
-        "variables.group.digest"
+        "labels.group[4]",
+        "variables.group.digest",
     ]
     assert digest_of(here) != digest_of(DatasetSource(named).identity())
 

@@ -11,6 +11,7 @@ import sys
 
 import numpy as np
 import pytest
+import xarray as xr
 
 pytest.importorskip("zarr")
 
@@ -48,7 +49,7 @@ def test_the_map_is_that_of_the_whole_picture_at_once(store):
     assert found["estimate"].dims == ("parameter", "y", "x")
     assert found["parameter"].values.tolist() == PARAMETERS
     assert found["unit"].values.tolist() == ["1", "µm", ""]
-    assert found["status"].attrs["flag_values"] == [0, 1, 2, 3, 4, 5]
+    assert found["status"].attrs["flag_values"] == [0, 1, 2, 3, 4, 5, -1]
     many = expected["starts"] > 1
     assert found.attrs["pixels_fitted"] == int((expected["status"] < 2).sum())
     assert found.attrs["share_of_several_optima"] == float((expected["optima"] > 1).values[many].mean())
@@ -73,6 +74,63 @@ def test_workers_that_know_nothing_of_each_other(store):
     assert contents(store.path) == contents(alone.path)
 
 
+@pytest.mark.parametrize("consolidated", [False, True])
+def test_nothing_of_half_a_map_that_is_not_done_reads_as_data(store, consolidated):
+    """By xarray alone, and by what opens maps: no count of 0, no flag of 0, no number; means are of what is done."""
+    run_units(store, worker=(2, 4))
+    expected = store.fit.fit_block(picture())
+    done = np.zeros((40, 28), dtype=bool)
+    for number in set(range(6)) - set(store.missing()):
+        done[tuple(store.grid.slices(number).values())] = True
+    with open_map(store.path, partial=True) as ours:
+        plain = xr.open_zarr(store.path, consolidated=consolidated, chunks=None)
+        for found in (plain, ours):
+            assert found.attrs["map_complete"] == 0
+            for name in ("estimate", "standard_error", "chi2", "starts", "optima"):
+                assert np.isnan(found[name].values[..., ~done]).all()
+                held = expected[name].transpose(*found[name].dims).values
+                np.testing.assert_array_equal(found[name].values[..., done], held[..., done])
+            assert float(found["starts"].mean()) == pytest.approx(
+                float(expected["starts"].transpose("y", "x").values[done].mean())
+            )
+            for name, value in (("status", -1), ("flags", 128)):
+                variable = found[name]
+                said = variable.attrs["flag_meanings"].split()
+                numbers = list(variable.attrs["flag_values" if name == "status" else "flag_masks"])
+                assert said[numbers.index(value)] == "not_yet_fitted"
+                assert variable.dtype.kind in "iu"
+                assert (variable.values[..., ~done] == value).all()
+                assert (variable.values[..., done] != value).all()
+    run_units(store)
+    whole = open_map(store.path)
+    assert not any(variable.dtype.kind == "f" for variable in (whole["starts"], whole["optima"]))
+    assert "_FillValue" not in whole["starts"].attrs
+    np.testing.assert_array_equal(
+        xr.open_zarr(store.path, consolidated=consolidated)["starts"], whole["starts"]
+    )
+
+
+def test_a_former_layout_is_read_where_it_is_complete_and_not_gone_on_with(store):
+    """Counts of 0 in it may be pixels that nobody has come to."""
+
+    def made_former(complete):
+        file = store.path / "zarr.json"
+        described = json.loads(file.read_text())
+        described["attributes"] |= {"map_layout": 1, "map_complete": complete}
+        file.write_text(json.dumps(described))
+
+    run_units(store)
+    made_former(1)
+    assert (open_map(store.path)["status"] >= 0).all()
+    assert run_units(store_at(store.path)).done == 0
+    made_former(0)
+    for use in (lambda: open_map(store.path, partial=True), lambda: store_at(store.path)):
+        with pytest.raises(
+            DataError, match=r"layout 1.*counts and flags of 0 .* Choose another folder, or complete"
+        ):
+            use()
+
+
 def test_a_store_goes_on_and_does_nothing_twice(store, monkeypatch):
     run_units(store, worker=(1, 2))
     done = []
@@ -92,6 +150,7 @@ def test_a_store_of_other_settings_or_another_input_is_refused_by_name(store):
     other = picture()
     other["I"][0, 0, 0] = 0.5
     named = picture().assign_attrs(quantity="radiance")
+    turned = picture().assign_coords(y=range(40)[::-1], wavelength=650.0)
     for make, words in (
         (lambda: store_at(store.path, seed=1), r"fit\.seed: 0 in the store, 1 here\. Choose another folder"),
         (
@@ -99,6 +158,10 @@ def test_a_store_of_other_settings_or_another_input_is_refused_by_name(store):
             r'input\.variables\.I\.digest: "[0-9a-f]{38}…" in the store, "',
         ),
         (lambda: store_at(store.path, named), r'attributes\.quantity: "brdf" in the store, "radiance" here'),
+        (
+            lambda: store_at(store.path, turned),
+            r'input\.labels\.wavelength: \(none\) in the store, "650\.0" here',
+        ),
         (lambda: store_at(store.path, picture(40, 30)), r"I\.form: .*x: 28.*in the store, .*x: 30"),
     ):
         with pytest.raises(

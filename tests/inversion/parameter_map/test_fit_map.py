@@ -281,7 +281,15 @@ def test_what_a_map_says_of_itself(data):
 def test_a_template_takes_no_memory(data):
     prepared = pbrdf.MapFit.prepare(data, **FEW)
     form = prepared.template()
-    assert (form["status"] == PENDING).all() and np.isnan(form["estimate"]).all()
+    blank = {
+        "degrees_of_freedom": -1,
+        "optima": -1,
+        "starts": -1,
+        "flags": FLAGS["not_yet_fitted"],
+        "status": PENDING,
+    }
+    for name, variable in form.data_vars.items():
+        assert (variable == blank[name]).all() if name in blank else np.isnan(variable).all()
     assert form["estimate"].variable.values.strides == (0, 0, 0)
     json.dumps(prepared.settings)
 

@@ -11,6 +11,7 @@ import xarray as xr
 from map_helpers import directions, measured, varied
 
 import pbrdf
+from pbrdf.inversion.parameter_map.block_stack import stack_of_block
 from pbrdf.inversion.parameter_map.fit_map import block_sizes
 
 FEW = {"fix": {"k": 1.2504, "b": 0.1827}, "starts": 8}
@@ -177,3 +178,21 @@ def test_data_of_a_file_opened_with_xarray_are_data(data, tmp_path):
 def test_no_pixels_are_refused(data):
     with pytest.raises(pbrdf.DataError, match="the data have no pixels: y: 0, x: 7"):
         pbrdf.fit_map(data.isel(y=slice(0, 0)), **FEW)
+
+
+@pytest.mark.parametrize("order", ["IQUV", "IUQV", "VUQI"])
+@pytest.mark.parametrize("dims", [("stokes_out", "stokes_in"), ("stokes_in", "stokes_out")])
+def test_elements_of_matrices_go_by_their_labels(order, dims):
+    """Where rows and columns stand in a file, and which come first, changes nothing."""
+    rng = np.random.default_rng(2)
+    values = rng.uniform(-0.1, 0.1, (2, 3, 4, 4))
+    values[..., 0, 0] = 1.0
+    angles = {name: ("geometry", [0.2, 0.4]) for name in ("theta_i", "theta_r", "phi")}
+    labels = {"stokes_out": list("IQUV"), "stokes_in": list("IQUV")}
+    attrs = {"quantity": "brdf", "illumination": [1.0, 0.0, 0.0, 0.0]}
+    block = xr.Dataset({"mueller": (("geometry", "x", *labels), values)}, {**angles, **labels}, attrs)
+    other = block.sel(stokes_out=list(order), stokes_in=list(order)).transpose("x", *dims, "geometry")
+    here, there = stack_of_block(block, ["x"]), stack_of_block(other, ["x"])
+    assert here.channels == there.channels
+    np.testing.assert_array_equal(here.values, there.values)
+    np.testing.assert_array_equal(there.values[there.channels.index("m12")], values[..., 1, 2])

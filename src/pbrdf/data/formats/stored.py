@@ -16,6 +16,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from pbrdf.data.alignment import in_stokes_order
 from pbrdf.data.build import group_labels
 from pbrdf.data.degrees import exact_degrees
 from pbrdf.data.formats.attributes import plain_attributes
@@ -34,10 +35,18 @@ from pbrdf.data.validation import validate
 from pbrdf.errors import DataError
 from pbrdf.files.plain_numbers import json_from_text
 
-__all__ = ["from_stored", "pixels_from_stored", "require_no_pictures", "require_no_pixels", "to_stored"]
+__all__ = [
+    "NANOMETRES",
+    "from_stored",
+    "pixels_from_stored",
+    "require_no_pictures",
+    "require_no_pixels",
+    "to_stored",
+]
 
 _ANGLE_UNITS = {"degree": True, "degrees": True, "deg": True, "rad": False, "radian": False, "radians": False}
-_NANOMETRES = {
+#: What wavelengths are multiplied with to be in nm, by their unit.
+NANOMETRES = {
     "nm": 1.0,
     "nanometer": 1.0,
     "nanometre": 1.0,
@@ -54,8 +63,8 @@ def from_stored(stored: xr.Dataset, path: Path) -> xr.Dataset:
     """Turn what a file holds into a valid data set.
 
     Angles and wavelengths are converted by their attribute ``units``; without one they are taken in radians
-    and nm. Variables that the schema does not know are left out and listed in the attribute
-    ``ignored_variables``.
+    and nm. Stokes components are found by their labels, in whichever order they stand. Variables that the schema
+    does not know are left out and listed in the attribute ``ignored_variables``.
 
     Parameters
     ----------
@@ -139,7 +148,7 @@ def pixels_from_stored(stored: xr.Dataset, path: Path) -> xr.Dataset:
     Raises
     ------
     DataError
-        If a unit is not understood.
+        If a unit is not understood, or Stokes components have other labels.
     """
     found = _understood(stored, path)
     own = {
@@ -150,7 +159,11 @@ def pixels_from_stored(stored: xr.Dataset, path: Path) -> xr.Dataset:
 
 
 def _understood(stored: xr.Dataset, path: Path) -> xr.Dataset:
-    """What the schema knows of a file's content, in its units."""
+    """What the schema knows of a file's content, in its units, the Stokes components in order."""
+    try:
+        stored = in_stokes_order(stored)
+    except DataError as error:
+        raise DataError(f"{path}: {error}") from error
     known = {*COORDINATES, *VARIABLES, *map(std_name, VARIABLES), COVARIANCE, *STOKES_AXES}
     attrs = {}
     for name, value in plain_attributes(stored.attrs).items():
@@ -185,7 +198,7 @@ def _from_file_units(path: Path, name: str, array: xr.DataArray) -> NDArray[Any]
     values = array.values
     if name not in ANGLES and name != "wavelength":
         return values
-    table: Mapping[str, float] = _ANGLE_UNITS if name in ANGLES else _NANOMETRES
+    table: Mapping[str, float] = _ANGLE_UNITS if name in ANGLES else NANOMETRES
     units = array.attrs.get("units", "rad" if name in ANGLES else "nm")
     if not isinstance(units, str) or units not in table:
         raise DataError(f"{path}: the units {units!r} of {name} are not understood; use {', '.join(table)}")

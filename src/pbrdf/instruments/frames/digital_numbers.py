@@ -6,6 +6,9 @@ are not all multiples of it, and stated with ``alignment`` of the detector.
 
 Pixels that are saturated below the stated end of the range pile up at one number: many read the largest number there
 is, and hardly any the numbers just below it, which noise would otherwise spread them over.
+
+A picture of nothing but 0 beside others that are not is probably none: files that are made before they are filled read
+so where their writer was interrupted.
 """
 
 from __future__ import annotations
@@ -24,6 +27,8 @@ _CONTAINER = 16
 _ENOUGH = 16
 #: Pictures that vary by so many times the variance of noise, and by more than this share, are not equally bright.
 _FLICKER, _STEADY = 10.0, 5e-4
+#: Pictures that a note names at most.
+_TOLD = 3
 #: Pixels that a sample has at most, and that are counted at a time.
 _SAMPLE = 2**18
 #: As many pixels at the largest number are a pile, if they are so many times those of a number just below it.
@@ -68,6 +73,7 @@ class ConvertedFrames:
         self._levels = np.zeros(2**_CONTAINER, dtype=np.int64)
         self._said: list[str] = []
         self._repeats: dict[int, _Repeats] = {}
+        self._blank: dict[int, np.ndarray] = {}
         self.shift = self._found_shift(exposures)
 
     def read(self, series: int, first_row: int, last_row: int) -> np.ndarray:
@@ -77,6 +83,8 @@ class ConvertedFrames:
         except DataError as error:
             raise DataError(f"series {self.names[series]!r}: {error}") from None
         self._count(raw)
+        blank = np.asarray(~raw.any(axis=(-2, -1)))
+        self._blank[series] = np.logical_and(self._blank.get(series, blank), blank)
         if raw.ndim == 4:
             self._repeats.setdefault(series, _Repeats(raw.shape[:2])).add(raw)
         return raw
@@ -84,7 +92,7 @@ class ConvertedFrames:
     @property
     def notes(self) -> list[str]:
         """What the numbers read so far betray, one sentence each."""
-        said = [*self._said, *self._unseen_alignment(), *self._flicker()]
+        said = [*self._said, *self._unwritten(), *self._unseen_alignment(), *self._flicker()]
         pile = _pile(self._levels, self._detector)
         if pile is None:
             return said
@@ -108,6 +116,21 @@ class ConvertedFrames:
     def say(self, notes: list[str]) -> None:
         """Add to the notes."""
         self._said += notes
+
+    def _unwritten(self) -> list[str]:
+        """Pictures of nothing but 0."""
+        found = [
+            f"state {places[-1] + 1} of the series {self.names[series]!r}"
+            for series, blank in sorted(self._blank.items())
+            for places in np.argwhere(blank).tolist()
+        ]
+        if not found or len(found) == sum(blank.size for blank in self._blank.values()):
+            return []
+        more = f" and {len(found) - _TOLD} more" if len(found) > _TOLD else ""
+        return [
+            f"0 at every pixel that was read: {', '.join(found[:_TOLD])}{more}. If the camera saw light, it was "
+            "never written, as the writer was interrupted: leave the series out, or take it again"
+        ]
 
     def _unseen_alignment(self) -> list[str]:
         """Whether all numbers turned out to be multiples of something that the sample was too small to show."""

@@ -1,4 +1,8 @@
-"""Frames in netCDF files and Zarr folders: a variable over series, state, y and x, and repeat where there is one."""
+"""Frames in netCDF files and Zarr folders: a variable over series, state, y and x, and repeat where there is one.
+
+States are found by their labels, names or numbers (angles in degrees, or a count), wherever they stand. A whole number
+that the variable's ``_FillValue`` says to be none was not written: frames with one are not finished.
+"""
 
 from __future__ import annotations
 
@@ -29,6 +33,8 @@ _DIMENSIONS = {
     "x": ("x", "column", "columns"),
     "repeat": ("repeat", "repeats", "repetition"),
 }
+#: Angles of states that differ by no more are the same, degrees.
+_SAME = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,12 +76,26 @@ class GriddedFrames:
             values = part.transpose(*order).values
         except Exception as error:  # the libraries raise anything over a damaged file
             raise DataError(f"{self.path}: cannot be read: {error}") from error
+        self._require_written(values, series)
         return values if "state" in part.dims else values[..., np.newaxis, :, :]
 
     @property
     def layers(self) -> int:
         """Repeats of each state."""
         return self.variable.sizes.get("repeat", 1)
+
+    def _require_written(self, values: np.ndarray, series: int) -> None:
+        """Raise if whole numbers are those that stand for none; what is no number is a dead pixel later."""
+        fill = self.variable.attrs.get("_FillValue")
+        if fill is None or values.dtype.kind not in "iu":
+            return
+        count = int((values == fill).sum())
+        if count:
+            raise DataError(
+                f"{self.path}: {count} pixels of the series {self.names[series]!r} are {int(fill)}, the _FillValue of "
+                f"{self.variable.name}, which stands for what was not written: the frames are not finished. If it is a "
+                "number of the camera, leave the attribute _FillValue out"
+            )
 
 
 def open_grid(path: Path, states: Sequence[str]) -> GriddedFrames:
@@ -94,7 +114,9 @@ def open_grid(path: Path, states: Sequence[str]) -> GriddedFrames:
         If zarr is missing, the file cannot be read, or it does not hold such frames.
     """
     opened = open_zarr if path.suffix.lower() == ".zarr" else open_netcdf
-    file = opened(path, mask_and_scale=False, decode_times=False, cache=False)
+    # of Zarr's second version every array has a fill value, which says nothing of the numbers
+    plain = {"use_zarr_fill_value_as_mask": False} if opened is open_zarr else {}
+    file = opened(path, mask_and_scale=False, decode_times=False, cache=False, **plain)
     frames = _variable(path, file)
     require_raw(frames.dtype, f"{path}: the variable {frames.name}", means=True)
     names = _labels(frames, "series") if "series" in frames.dims else (path.stem,)
@@ -142,11 +164,42 @@ def _in_order(path: Path, frames: xr.DataArray, states: Sequence[str]) -> xr.Dat
         raise DataError(
             f"{path}: {frames.name} has {held} states, but the polarimeter {len(states)}: {named(states, 10)}"
         )
-    if len(states) == 1 or "state" not in frames.coords or frames["state"].dtype.kind not in "OUST":
+    if len(states) == 1 or "state" not in frames.coords:
         return frames
-    labels = _labels(frames, "state")
-    if set(labels) != set(states):
+    order = _order(frames["state"], states)
+    if order is None:
         raise DataError(
-            f"{path}: its states are {named(labels, 10)}, but those of the polarimeter {named(states, 10)}"
+            f"{path}: its states are {named(_labels(frames, 'state'), 10)}, but those of the polarimeter "
+            f"{named(states, 10)}: call them so, or leave the coordinate state out where they stand in this order"
         )
-    return frames if labels == tuple(states) else frames.isel(state=[labels.index(state) for state in states])
+    return frames if order == sorted(order) else frames.isel(state=order)
+
+
+def _order(labels: xr.DataArray, states: Sequence[str]) -> list[int] | None:
+    """Where in a file each state of the polarimeter stands; None where its labels are of others.
+
+    Labels are the states' names, their numbers (of angles in degrees, or in radians where the units say so), or a count
+    from 0 or 1.
+    """
+    texts = list(_labels(labels, "state"))
+    if set(texts) == set(states):
+        return [texts.index(state) for state in states]
+    found, wanted = _numbers(texts), _numbers(states)
+    if found is None or len(set(found)) != len(found):
+        return None
+    if str(labels.attrs.get("units", "")).startswith("rad"):
+        found = np.rad2deg(found).tolist()
+    if wanted is not None and np.allclose(sorted(found), sorted(wanted), rtol=0.0, atol=_SAME):
+        return [int(np.abs(np.subtract(found, one)).argmin()) for one in wanted]
+    for first in (0, 1):
+        if sorted(found) == list(range(first, first + len(states))):
+            return sorted(range(len(found)), key=found.__getitem__)
+    return None
+
+
+def _numbers(texts: Sequence[str]) -> list[float] | None:
+    """Labels as numbers; None where one is none."""
+    try:
+        return [float(text) for text in texts]
+    except ValueError:
+        return None

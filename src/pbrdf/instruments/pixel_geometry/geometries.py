@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
+from pbrdf.data.alignment import in_stokes_order, require_same_labels
 from pbrdf.data.build import make_dataset
 from pbrdf.data.schema import COVARIANCE, DIMENSION
 from pbrdf.errors import DataError
@@ -73,8 +74,9 @@ def as_geometries(
     Raises
     ------
     DataError
-        If the data set is no such map, or a label has no measured pixel.
+        If the data set is no such map, a label has no measured pixel, or the labels are of other pixels.
     """
+    dataset = in_stokes_order(dataset)
     known = [k for k, name in enumerate(STOKES) if name in dataset]
     if 0 not in known or any(name not in dataset[STOKES[0]].dims for name in (DIMENSION, "y", "x")):
         raise DataError("pixels become geometries of Stokes parameters over geometry, y and x (map_dataset)")
@@ -90,6 +92,7 @@ def as_geometries(
                 f"labels are whole numbers, one for each of the picture's {dataset.sizes['y']} × "
                 f"{dataset.sizes['x']} pixels"
             )
+        require_same_labels(array, "the labels", dataset, "the pictures", ("y", "x"))
         if not names:
             raise DataError("no pixel has a label other than 0")
     return {
@@ -148,7 +151,10 @@ def _taken(dataset: xr.Dataset, known: list[int], chosen: np.ndarray, every: int
         stokes = np.stack([one[STOKES[k]].transpose("y", "x").values for k in known], axis=-1)
         where = np.nonzero(chosen & np.isfinite(stokes).all(axis=-1))
         where = tuple(index[::every] for index in where)
-        angles = [np.broadcast_to(one[a].values, chosen.shape)[where] for a in ("theta_i", "theta_r", "phi")]
+        angles = [
+            xr.broadcast(one[a], one[STOKES[0]])[0].transpose("y", "x").values[where]
+            for a in ("theta_i", "theta_r", "phi")
+        ]
         covariance = None
         if COVARIANCE in one:
             whole = one[COVARIANCE].transpose("y", "x", ...).values[where]

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from pbrdf.data.alignment import require_same_labels
 from pbrdf.data.formats.csv_table.columns import COVARIANCES
 from pbrdf.data.schema import (
     COVARIANCE,
@@ -284,9 +285,10 @@ def _pixels_alone(
 
 
 def _require_sizes(geometry: xr.Dataset, stokes: xr.Dataset) -> None:
-    """Check that a geometry is that of these pictures."""
+    """Check that a geometry is that of these pictures, pixel by pixel."""
     for dim, own in ((DIMENSION, "series"), ("y", "y"), ("x", "x")):
         size, there = geometry.sizes.get(dim, 1), stokes.sizes[own]
         named = any(dim in variable.dims and name != dim for name, variable in geometry.variables.items())
         if named and size != there and not (dim == DIMENSION and size == 1):
             raise DataError(f"the geometry has {size} in {own}, the pictures have {there}")
+    require_same_labels(geometry, "the geometry", stokes, "the pictures", ("y", "x"))

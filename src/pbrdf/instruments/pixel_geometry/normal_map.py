@@ -2,11 +2,14 @@
 
 Files are NPY arrays, or netCDF files and Zarr folders with variables of these names:
 
-* normals: NPY of the shape (rows, columns, 3); ``normal`` over (y, x, component). Vectors away from the surface in the
-  camera's axes (x right, y up, z to the camera), of any length; NaN or (0, 0, 0) is off the sample.
+* normals: NPY of the shape (rows, columns, 3); ``normal`` over (y, x, component), the components x, y, z in this order
+  or labelled. Vectors away from the surface in the camera's axes (x right, y up, z to the camera), of any length; NaN
+  or (0, 0, 0) is off the sample.
 * angles: NPY of the shape (rows, columns, 4) in degrees; ``theta_i``, ``theta_r``, ``phi``, ``rotation`` over (y, x) or
   (geometry, y, x), with the attribute ``units``, rad or degree, and perhaps ``irradiance`` and ``mask``: what
   :meth:`.PixelGeometry.of` gives, stored. NaN is off the sample.
+
+Coordinates y and x, where a file has them, must be those of the pictures.
 """
 
 from __future__ import annotations
@@ -19,6 +22,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from pbrdf.data.alignment import few, require_same_labels
 from pbrdf.data.formats.zarr_folder import open_zarr
 from pbrdf.data.schema import DIMENSION
 from pbrdf.errors import DataError
@@ -34,6 +38,7 @@ from pbrdf.instruments.pixel_geometry.geometry import (
 __all__ = ["AngleMaps", "NormalMap"]
 
 _ANGLES = ("theta_i", "theta_r", "phi", "rotation")
+_COMPONENTS = ("x", "y", "z")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,8 +61,11 @@ class NormalMap(CurvedSample):
             raise DataError("normals do not tell where the points of the sample are: a lamp cannot be near")
 
     def located(self, stokes: xr.Dataset) -> NormalMap:
-        shape = self._open().shape
+        opened = self._open()
+        shape = opened.shape
         _require_pictures(shape[:2], stokes, "normals")
+        if isinstance(opened, xr.DataArray):
+            require_same_labels(opened, "the normals", stokes, "the pictures", ("y", "x"))
         if len(shape) != 3 or shape[2] != 3:
             raise DataError(f"normals have the shape (rows, columns, 3), not {shape}")
         return replace(self, camera=self._sized(stokes))
@@ -66,7 +74,7 @@ class NormalMap(CurvedSample):
         if isinstance(self.normals, np.ndarray):
             return self.normals
         path = Path(self.normals)
-        return _open_npy(path) if path.suffix.lower() == ".npy" else _variable(path, "normal")
+        return _open_npy(path) if path.suffix.lower() == ".npy" else _normals(path)
 
     def described(self) -> dict[str, Any]:
         return {"kind": "normals", **_named(self.normals)}
@@ -107,6 +115,7 @@ class AngleMaps(PixelGeometry):
                 )
         _require_pictures((maps.sizes["y"], maps.sizes["x"]), stokes, "maps of angles")
         require_series(maps.sizes.get(DIMENSION, 1), stokes, "maps of each angle")
+        require_same_labels(maps, "the maps of angles", stokes, "the pictures", ("y", "x"))
         return self
 
     def _open(self) -> xr.Dataset:
@@ -171,20 +180,30 @@ def _open_grid(path: Path) -> xr.Dataset:
     return (open_zarr if path.suffix.lower() == ".zarr" else open_netcdf)(path, decode_times=False)
 
 
-def _variable(path: Path, name: str) -> xr.Variable:
+def _normals(path: Path) -> xr.DataArray:
+    """The variable of normals, its components in order; no numbers are read."""
     grid = _open_grid(path)
-    if name not in grid:
+    if "normal" not in grid:
         raise DataError(
-            f"{path}: there is no variable {name!r}; it has {', '.join(map(str, grid.data_vars))}"
+            f"{path}: there is no variable 'normal'; it has {', '.join(map(str, grid.data_vars))}"
         )
-    return grid[name].variable
+    array = grid["normal"]
+    if {"y", "x"} <= {*array.dims}:
+        array = array.transpose("y", "x", ...)
+    axis = array.dims[-1]
+    if axis not in array.coords or array[axis].dtype.kind not in "OUST":
+        return array
+    labels = array[axis].values.astype(str).tolist()
+    if sorted(labels) != list(_COMPONENTS):
+        raise DataError(f"{path}: the components of normal are {few(labels)}: they must be x, y, z")
+    return array.isel({axis: [labels.index(name) for name in _COMPONENTS]})
 
 
 def _cut(array: Any, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """Values at the pixels with these centres, shape (rows, columns, …); of a file only a block is read."""
     columns, rows = np.floor(x[0]).astype(int), np.floor(y[:, 0]).astype(int)
     block = array[rows.min() : rows.max() + 1, columns.min() : columns.max() + 1]
-    values = np.asarray(block.values if isinstance(block, xr.Variable) else block, dtype=float)
+    values = np.asarray(block.values if isinstance(block, xr.DataArray) else block, dtype=float)
     return values[np.ix_(rows - rows.min(), columns - columns.min())]
 
 

@@ -6,14 +6,16 @@ their covariance by detector noise (the matrix is symmetric: its elements on and
 digital numbers, angles in degrees. The polarisation refers to the instrument's axes: x to the right in the picture, y
 upwards, angles counterclockwise. Components that the instrument does not determine have no variable; a pixel with a
 flag is NaN.
+
+A file has its name when it is complete. In the hidden one that a killed process leaves, what was not written is NaN,
+and its flag says so.
 """
 
 from __future__ import annotations
 
 import json
-import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -24,6 +26,7 @@ import xarray as xr
 from pbrdf.data.formats.csv_table.columns import COVARIANCES
 from pbrdf.data.formats.zarr_folder import create_zarr, list_arrays, require_zarr
 from pbrdf.errors import DataError
+from pbrdf.files.atomic import atomic_file, atomic_folder
 from pbrdf.files.netcdf_files import PatientFile, write_netcdf_file
 from pbrdf.instruments.frames.frames import Frames
 from pbrdf.instruments.goniometer.angle_table import AngleTable
@@ -39,6 +42,8 @@ __all__ = ["MapWriter"]
 #: Rows of a chunk of a file are so many that it holds about this many bytes.
 _CHUNK = 2**18
 
+#: Flag of pixels that were not written.
+_UNWRITTEN = np.uint8(128)
 #: Units and long name of each variable, and which Stokes components it needs.
 _VARIABLES: dict[str, tuple[str, str, tuple[int, ...]]] = {
     **{name: ("1", f"Stokes parameter {name}, digital numbers", (k,)) for k, name in enumerate(STOKES)},
@@ -67,7 +72,7 @@ _VARIABLES: dict[str, tuple[str, str, tuple[int, ...]]] = {
 class MapWriter:
     """A file of Stokes parameters pixel by pixel: a sink for :func:`pbrdf.instruments.reduction.reduce.reduce`.
 
-    The file is there from the first block on; if the reduction fails, it goes.
+    The file is written beside, and has its name when the reduction is done; if that fails, it goes.
 
     Parameters
     ----------
@@ -89,7 +94,7 @@ class MapWriter:
     ------
     DataError
         If the extension is another one, zarr is not installed, or the angles lack a series; when the first block is
-        due, if there is something of that name.
+        due, if there is something of that name; if the file cannot be written.
     """
 
     def __init__(
@@ -120,42 +125,48 @@ class MapWriter:
         }
         self._attributes["flags"] = {
             "long_name": "why a pixel was left out; 0 is a good pixel",
-            "flag_masks": np.array([flag.value for flag in BAD_FLAGS], dtype=np.uint8).tolist(),
-            "flag_meanings": " ".join(str(flag.name).lower() for flag in BAD_FLAGS),
+            "flag_masks": np.array(
+                [*(flag.value for flag in BAD_FLAGS), _UNWRITTEN], dtype=np.uint8
+            ).tolist(),
+            "flag_meanings": " ".join([*(str(flag.name).lower() for flag in BAD_FLAGS), "not_yet_reduced"]),
         }
         self.names = tuple(self._attributes)
         self._buffers: dict[str, np.ndarray] = {}
         self._variables: dict[str, Any] = {}
         self._file: Any = None
         self._target: PatientFile | None = None
+        self._place: AbstractContextManager[Path] = (atomic_file if self._kind == ".nc" else atomic_folder)(
+            path
+        )
 
     def __enter__(self) -> MapWriter:
         if self._path.exists():
             raise DataError(f"{self._path}: there is something of that name already")
+        beside = self._place.__enter__()
         try:
             with self._written():
-                self._create()
-        except BaseException:
-            self._remove()
+                self._create(beside)
+        except BaseException as error:
+            self._give_up(error)
             raise
         return self
 
-    def _create(self) -> None:
+    def _create(self, path: Path) -> None:
         """Write all but the numbers."""
         if self._kind == ".nc":
             import h5netcdf
 
-            write_netcdf_file(self._path, {"/": self._head})
-            self._target = PatientFile(self._path)
+            write_netcdf_file(path, {"/": self._head})
+            self._target = PatientFile(path)
             self._file = h5netcdf.File(self._target, "a")
         else:
             import zarr
 
-            create_zarr(self._head, self._path)
-            self._file = zarr.open_group(self._path, mode="r+", zarr_format=3, use_consolidated=False)
+            create_zarr(self._head, path)
+            self._file = zarr.open_group(path, mode="r+", zarr_format=3, use_consolidated=False)
         self._variables = {name: self._variable(name) for name in self.names}
         if self._kind == ".zarr":
-            list_arrays(self._path)
+            list_arrays(path)
         self._buffers = {name: np.empty(self._chunk_shape[1:], _type(name)) for name in self.names}
         if self._kind == ".nc":
             # the file is complete but for its numbers, and h5py writes small parts of them faster
@@ -165,13 +176,14 @@ class MapWriter:
             # rows come in order: one chunk of each variable has to be kept, not the usual megabytes
             self._file = h5py.File(self._target, "r+", rdcc_nbytes=2 * _CHUNK)
             self._variables = {name: self._file[name] for name in self.names}
+            # no flag of a complete file is missing: bits stay whole numbers
+            del self._variables["flags"].attrs["_FillValue"]
 
     def _variable(self, name: str) -> Any:
         dims = ("series", "y", "x")
         dtype = _type(name)
         attributes = self._attributes[name]
-        # a flag is never missing: 0 is a good pixel
-        fill = None if name == "flags" else np.float32(np.nan)
+        fill = _UNWRITTEN if name == "flags" else np.float32(np.nan)
         if self._kind == ".nc":
             variable = self._file.create_variable(name, dims, dtype, chunks=self._chunk_shape, fillvalue=fill)
         else:
@@ -235,14 +247,16 @@ class MapWriter:
                         self._variables[name][block.series, start:end, :] = buffer[: end - start]
             done += taken
 
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, *_: object) -> None:
         try:
             self._close()
-        except BaseException:
-            self._remove()
+        except BaseException as own:
+            self._give_up(own)
             raise
-        if kind is not None:
-            self._remove()
+        if error is None:
+            self._place.__exit__(None, None, None)
+        else:
+            self._give_up(error)
 
     @contextmanager
     def _written(self) -> Iterator[None]:
@@ -260,14 +274,11 @@ class MapWriter:
             if self._target is not None:
                 self._target.close()
 
-    def _remove(self) -> None:
-        """Leave nothing half-written."""
+    def _give_up(self, error: BaseException) -> None:
+        """Leave nothing half-written; raises DataError in the place of what the disk has to say."""
         with suppress(Exception):  # the error that matters is another one
             self._close()
-        if self._path.is_dir():
-            shutil.rmtree(self._path, ignore_errors=True)
-        else:
-            self._path.unlink(missing_ok=True)
+        self._place.__exit__(type(error), error, error.__traceback__)
 
 
 def _type(name: str) -> np.dtype[Any]:

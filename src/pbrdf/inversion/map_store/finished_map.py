@@ -13,7 +13,7 @@ from pbrdf.data.formats.zarr_folder import open_zarr
 from pbrdf.errors import DataError
 from pbrdf.files.atomic import atomic_file
 from pbrdf.files.plain_numbers import json_from_text
-from pbrdf.files.zarr_chunks import StoredArray
+from pbrdf.files.zarr_chunks import StoredArray, array_names
 from pbrdf.inversion.map_store.map_store import COMPLETE, MARK, MapStore, damaged, stored_attributes
 
 __all__ = ["finish", "open_map"]
@@ -74,13 +74,14 @@ def open_map(path: str | Path, *, partial: bool = False) -> xr.Dataset:
     path
         The store.
     partial
-        Whether a map that is not complete is opened as well. Its pixels that are not done have the status −1; the
-        attribute ``units_missing`` says how many units those are.
+        Whether a map that is not complete is opened as well. Its pixels that are not done have the status −1 and the
+        flag 128, and NaN for everything else, counts too, which are floating point then; the attribute
+        ``units_missing`` says how many units those are.
 
     Returns
     -------
     xarray.Dataset
-        The map; no Dask.
+        The map; no Dask. The counts of a complete one are integers.
 
     Raises
     ------
@@ -106,6 +107,19 @@ def open_map(path: str | Path, *, partial: bool = False) -> xr.Dataset:
             raise damaged(path, error) from error
         return found.assign_attrs(units_missing=left)
     try:
-        return open_zarr(path, cache=False)
+        found = open_zarr(path, cache=False, mask_and_scale=dict.fromkeys(_counts(path), False))
+        for variable in found.variables.values():
+            variable.attrs.pop("_FillValue", None)
+        return found
     except DataError as error:
         raise DataError(f"{error}. The command that made this map writes what is lost again") from error
+
+
+def _counts(path: Path) -> list[str]:
+    """The arrays of integers with a value for pixels that are not done."""
+    found = []
+    for name in array_names(path):
+        described = json_from_text((path / name / "zarr.json").read_bytes())
+        if "int" in str(described.get("data_type")) and "_FillValue" in described.get("attributes", {}):
+            found.append(name)
+    return found

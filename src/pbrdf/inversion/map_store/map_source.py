@@ -1,10 +1,10 @@
 """Where the pixels of a map come from: a data set in memory, or files of which each process reads its units only.
 
 A source says what its input is, so that a map that was begun with another is not gone on with. Of files that are their
-size, names, shapes and types of the variables, and the digest of a sample of the bytes: all of a file up to 4 MiB, else
-the first and the last MiB and 64 pieces of 16 KiB spread evenly. Measured numbers differ everywhere by their noise, so
-that a sample tells two measurements apart without reading terabytes; where the file lies and when it was written does
-not count, as machines see it under other names. What is in memory is digested as a whole.
+size, names, shapes and types of the variables, labels that are few, and the digest of a sample of the bytes: all of a
+file up to 4 MiB, else the first and the last MiB and 64 pieces of 16 KiB spread evenly. Measured numbers differ
+everywhere by their noise, so that a sample tells two measurements apart without reading terabytes; where the file lies
+and when it was written does not count, as machines see it under other names. What is in memory is digested as a whole.
 """
 
 from __future__ import annotations
@@ -24,6 +24,8 @@ from pbrdf.inversion.map_store.settings import digest_of
 __all__ = ["DatasetSource", "MapSource", "file_identity"]
 
 _MIB, _PIECE, _PIECES = 2**20, 2**14, 64
+#: Coordinates of up to so many values are told one by one.
+_FEW_LABELS = 64
 #: A file of up to so many bytes is digested as a whole.
 _WHOLE = 4 * _MIB
 
@@ -74,10 +76,19 @@ def file_identity(path: Path, opened: xr.Dataset) -> dict[str, Any]:
     path
         A file, or the folder of a Zarr store.
     opened
-        What it holds; no numbers are read.
+        What it holds; no numbers are read but those of short coordinates.
+
+    Raises
+    ------
+    DataError
+        If it cannot be read.
     """
     forms = {str(name): _form(variable) for name, variable in opened.variables.items()}
-    return {"variables": forms, **_sampled(path)}
+    try:
+        labels = _labels(opened)
+    except Exception as error:  # decoders raise anything over a damaged chunk
+        raise DataError(f"{path}: cannot be read: {' '.join(str(error).split())}") from error
+    return {"variables": forms, "labels": labels, **_sampled(path)}
 
 
 def _form(variable: xr.Variable) -> str:
@@ -98,7 +109,16 @@ def _identity(dataset: xr.Dataset) -> dict[str, Any]:
         str(name): np.asarray(value).tolist() if not isinstance(value, (str, list, dict)) else value
         for name, value in dataset.attrs.items()
     }
-    return {"variables": variables, "attributes": attrs}
+    return {"variables": variables, "labels": _labels(dataset), "attributes": attrs}
+
+
+def _labels(dataset: xr.Dataset) -> dict[str, Any]:
+    """Values of the coordinates that have few: digests tell that they differ, and these how."""
+    return {
+        str(name): np.asarray(coordinate.values).astype(str).tolist()
+        for name, coordinate in dataset.coords.items()
+        if coordinate.ndim <= 1 and coordinate.size <= _FEW_LABELS
+    }
 
 
 def _sampled(path: Path) -> dict[str, Any]:

@@ -5,6 +5,10 @@ estimates of all of them. ``status`` is written last and is the mark of a unit t
 when it is complete, so a process that is killed leaves units without the mark, and files ``*.partial`` that nobody
 reads. A unit depends on its own pixels alone: whoever writes it, and however often, writes the same numbers.
 
+Who reads a store without this package finds in units that are not done what the fit's template holds, which is no
+result: NaN, counts below 0, flags and a status that say so. Counts have that as CF's ``_FillValue``, so that xarray
+makes NaN of it. ``map_complete`` is 0 until the last step.
+
 The folder's attributes hold the settings that decide the numbers and the identity of the input, as JSON, and their
 digest. Whoever wants to write compares the digest before every unit.
 """
@@ -43,8 +47,9 @@ __all__ = [
     "stored_attributes",
 ]
 
-#: Version of the layout of stores; another one is refused.
-_LAYOUT = 1
+#: Version of the layout of stores; others are refused, but for complete maps of a former one, in which units that were
+#: not done held 0 for counts and flags.
+_LAYOUT, _FORMER = 2, 1
 #: Attributes of the folder: the layout, settings and input as JSON, their digest, and 1 when nothing is missing.
 _VERSION, _SETTINGS, _DIGEST, COMPLETE = "map_layout", "map_settings", "map_digest", "map_complete"
 #: The array that is written last, and its value where nothing is written yet.
@@ -186,7 +191,7 @@ class MapStore:
         Raises
         ------
         DataError
-            If it is not; says what differs.
+            If it is not; says what differs. If it is an unfinished one of a former layout.
         """
         attributes = stored_attributes(self.path)
         if attributes.get(_DIGEST) == self.digest:
@@ -292,7 +297,7 @@ def stored_attributes(path: Path) -> dict[str, Any]:
     Raises
     ------
     DataError
-        If there is none, or it is one of another version.
+        If there is none, or it is one of another version; complete ones of a former version are read.
     """
     if not path.exists():
         raise DataError(f"{path}: there is no such map")
@@ -304,10 +309,14 @@ def stored_attributes(path: Path) -> dict[str, Any]:
         version = attributes[_VERSION]
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise DataError(f"{path}: this Zarr folder is no map of pbrdf, or it is damaged") from error
-    if version != _LAYOUT:
-        raise DataError(
-            f"{path}: this map has the layout {version}, of another version of pbrdf; {_LAYOUT} is known"
+    if version != _LAYOUT and not (version == _FORMER and attributes.get(COMPLETE)):
+        more = (
+            ": counts and flags of 0 in it may be pixels that nobody has come to. Choose another folder, or complete "
+            "it with that version"
+            if version == _FORMER
+            else f"; {_LAYOUT} is known"
         )
+        raise DataError(f"{path}: this map has the layout {version}, of another version of pbrdf{more}")
     return attributes
 
 
@@ -345,6 +354,11 @@ def _write_template(folder: Path, template: xr.Dataset, grid: UnitGrid, settings
     )
     for name in names:
         variable = template[name].variable
+        # what the template holds is what no pixel that is done has
+        fill = variable.values[(0,) * variable.ndim]
+        attributes = {name: _plain(value) for name, value in variable.attrs.items()}
+        if variable.dtype.kind in "iu" and "flag_meanings" not in attributes:
+            attributes["_FillValue"] = int(fill)
         # the mark has one file for each unit in the order of the map's dimensions
         dims = grid.dims if name == MARK else variable.dims
         sizes = {dim: max(size, 1) for dim, size in variable.sizes.items()}
@@ -354,9 +368,9 @@ def _write_template(folder: Path, template: xr.Dataset, grid: UnitGrid, settings
             dtype=variable.dtype,
             shards=tuple(units.get(str(dim), sizes[dim]) for dim in dims),
             chunks=tuple(chunks.get(str(dim), sizes[dim]) for dim in dims),
-            fill_value=NOT_DONE if name == MARK else np.nan if variable.dtype.kind == "f" else 0,
+            fill_value=fill,
             dimension_names=[str(dim) for dim in dims],
-            attributes={name: _plain(value) for name, value in variable.attrs.items()},
+            attributes=attributes,
         )
     list_arrays(folder)
 

@@ -8,9 +8,11 @@ several series, or several geometries, of the same pixels.
 from __future__ import annotations
 
 import dataclasses
+import functools
 import hashlib
 import math
-from collections.abc import Mapping, Sequence
+import operator
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -18,10 +20,12 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from pbrdf.data.alignment import few, require_same_labels
+from pbrdf.data.formats.attributes import plain_attributes
 from pbrdf.data.formats.csv_table.columns import COVARIANCES
-from pbrdf.data.formats.stored import pixels_from_stored
+from pbrdf.data.formats.stored import NANOMETRES, pixels_from_stored
 from pbrdf.data.formats.zarr_folder import open_zarr
-from pbrdf.data.schema import COORDINATES, DIMENSION, STOKES_AXES
+from pbrdf.data.schema import COORDINATES, COVARIANCE, DIMENSION, NATURAL_LIGHT, STOKES_AXES, VARIABLES
 from pbrdf.errors import DataError
 from pbrdf.files.digest import sha256_of
 from pbrdf.files.netcdf_files import SIGNATURE, open_netcdf
@@ -30,12 +34,22 @@ from pbrdf.instruments.pixel_geometry.geometry import PixelGeometry
 from pbrdf.instruments.pixel_geometry.labels import read_labels
 from pbrdf.instruments.pixel_geometry.map_dataset import map_block
 from pbrdf.inversion.map_store.map_source import file_identity
-from pbrdf.inversion.parameter_map.map_fit import LABEL
+from pbrdf.inversion.parameter_map.map_fit import LABEL, MASK
 from pbrdf.optics.stokes import STOKES
 
 __all__ = ["PictureSource", "opened_pictures"]
 
 _SERIES = "series"
+#: Attributes that say what the numbers of a file are, and what it means where one is not there.
+_MEANINGS: dict[str, Any] = {
+    "quantity": "dn",
+    "scale": None,
+    "stokes_convention": "p-s",
+    "illumination": list(NATURAL_LIGHT),
+    "simulated": 0,
+}
+#: Wavelengths that differ by no more are the same, nm.
+_SAME_WAVELENGTH = 0.5
 
 
 @dataclass(frozen=True)
@@ -88,7 +102,8 @@ class PictureSource:
         Raises
         ------
         DataError
-            If a file cannot be read, files do not fit each other, or a geometry is missing or one too many.
+            If a file cannot be read, files do not fit each other (other pixels, wavelengths or components, another
+            quantity or convention), or a geometry is missing or one too many.
         """
         opened = [opened_pictures(path) for path in paths]
         pictures = [DIMENSION not in one.dims for one in opened]
@@ -122,6 +137,8 @@ class PictureSource:
                 raise DataError(
                     f"{path}: has {_in_words(sizes)} pixels, {paths[0]} has {_in_words(found[0])}"
                 )
+        for path, one in zip(paths[1:], opened[1:], strict=True):
+            _require_alike(opened[0], paths[0], one, path, found[0])
         parts = None
         if labels is not None:
             if not {"y", "x"} <= set(found[0]):
@@ -146,15 +163,19 @@ class PictureSource:
                 shape = [self.sizes.get(str(d), size) for d, size in variable.sizes.items()]
                 values = np.broadcast_to(variable.values, shape)
                 variables[name] = xr.Variable(variable.dims, values, variable.attrs)
-        for dim in self.sizes:
-            if dim in self._files()[0].coords:
-                variables[dim] = self._files()[0][dim].variable
+        variables |= {dim: places.variable for dim, places in self.places.coords.items()}
         coords = {name for name in variables if name in first.coords}
         return xr.Dataset(
             {name: v for name, v in variables.items() if name not in coords},
             {name: variables[name] for name in coords},
             first.attrs,
         )
+
+    @property
+    def places(self) -> xr.Dataset:
+        """Coordinates of the pixels along each dimension, of those that have some."""
+        first = self._files()[0]
+        return xr.Dataset(coords={dim: first[dim] for dim in self.sizes if dim in first.coords})
 
     def block(self, region: Mapping[str, slice]) -> xr.Dataset:
         """Some pixels, in memory.
@@ -267,12 +288,54 @@ def _pixel_sizes(path: Path, opened: xr.Dataset) -> dict[str, int]:
     return sizes
 
 
+def _require_alike(first: xr.Dataset, name: Path, other: xr.Dataset, path: Path, dims: Iterable[str]) -> None:
+    """Raise if a file is labelled otherwise than the first one: nothing that is put together goes by its place."""
+    require_same_labels(other, str(path), first, str(name), dims)
+    meanings = [plain_attributes(one.attrs) for one in (other, first)]
+    for key, usual in _MEANINGS.items():
+        values = [attrs.get(key, usual) for attrs in meanings]
+        if values[0] != values[1]:
+            raise DataError(
+                f"{key} is {_said(values[0])} in {path}, and {_said(values[1])} in {name}: one map is made of one {key}"
+            )
+    held = [
+        [n for n in map(str, one.data_vars) if n in VARIABLES or n == COVARIANCE] for one in (other, first)
+    ]
+    if sorted(held[0]) != sorted(held[1]):
+        raise DataError(
+            f"{path}: holds {', '.join(held[0])}, and {name} {', '.join(held[1])}: several files of a map hold the "
+            "same components"
+        )
+    here, there = _wavelengths(other), _wavelengths(first)
+    off = np.abs(np.subtract.outer(here, there)) > _SAME_WAVELENGTH
+    if bool(here.size) != bool(there.size) or off.all(axis=0).any() or off.all(axis=1).any():
+        said = [few(one) or "not stated" for one in (here, there)]
+        raise DataError(
+            f"wavelength is {said[0]} in {path}, and {said[1]} in {name}: a map has one set of parameters for all, so "
+            "make a map of each"
+        )
+
+
+def _wavelengths(opened: xr.Dataset) -> np.ndarray:
+    """Those of a file, each once, nm; empty where it states none."""
+    if "wavelength" not in opened.variables:
+        return np.empty(0)
+    found = opened["wavelength"]
+    factor = NANOMETRES.get(str(found.attrs.get("units", "nm")), 1.0)
+    values = np.unique(factor * found.values.astype(float))
+    return values[np.isfinite(values)]
+
+
+def _said(value: Any) -> str:
+    return "not stated" if value is None else few(value)
+
+
 def _in_words(sizes: Mapping[str, int]) -> str:
     return " × ".join(f"{size} ({dim})" for dim, size in sizes.items())
 
 
 def _together(parts: Sequence[xr.Dataset], sizes: Mapping[str, int]) -> xr.Dataset:
-    """Geometries of several files one after the other; a coordinate along pixels is the first's."""
+    """Geometries of several files one after the other; a pixel that one of them leaves out is left out."""
     shared = {
         name for part in parts for name in COORDINATES if name in part and set(sizes) & set(part[name].dims)
     }
@@ -283,7 +346,7 @@ def _together(parts: Sequence[xr.Dataset], sizes: Mapping[str, int]) -> xr.Datas
             if name in part and not set(sizes) & set(part[name].dims):
                 part = part.assign_coords({name: part[name].expand_dims(_sizes_here(part, sizes))})
         spread.append(part)
-    return xr.concat(
+    found = xr.concat(
         spread,
         DIMENSION,
         data_vars="minimal",
@@ -292,6 +355,8 @@ def _together(parts: Sequence[xr.Dataset], sizes: Mapping[str, int]) -> xr.Datas
         join="override",
         combine_attrs="override",
     )
+    masks = [part[MASK] != 0 for part in parts if MASK in part.data_vars]
+    return found.assign({MASK: functools.reduce(operator.and_, masks)}) if masks else found
 
 
 def _sizes_here(part: xr.Dataset, sizes: Mapping[str, int]) -> dict[str, int]:

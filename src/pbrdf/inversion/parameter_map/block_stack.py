@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pbrdf.data.schema import COVARIANCE, DIMENSION, VARIABLES, std_name
+from pbrdf.data.alignment import in_stokes_order
+from pbrdf.data.schema import COVARIANCE, DIMENSION, STOKES_AXES, VARIABLES, std_name
 from pbrdf.errors import DataError, FitError
 from pbrdf.inversion.noise import Noise
 from pbrdf.inversion.stack import Stack
@@ -36,7 +37,7 @@ def stack_of_block(
     ----------
     block
         Variables of :mod:`pbrdf.data.schema` over ``geometry`` and ``dims`` in any order, angles over the image too or
-        not.
+        not. Stokes components are found by their labels.
     dims
         Dimensions of the image.
     noise, objective, covariance
@@ -50,10 +51,11 @@ def stack_of_block(
     Raises
     ------
     DataError
-        If angles that all pixels share are no directions above the horizon.
+        If angles that all pixels share are no directions above the horizon, or Stokes components have other labels.
     FitError
         As :meth:`Stack.from_columns`.
     """
+    block = in_stokes_order(block)
     shape = tuple(block.sizes[d] for d in dims)
     angles = {name: _columns(block[name].variable, dims, shape, shared=True) for name in ANGLES}
     for name in ANGLES[:2]:
@@ -97,7 +99,7 @@ def _columns(
     With ``shared``, (G, 1) where all pixels share them.
     """
     here = [d for d in dims if d in variable.dims]
-    front = [d for d in variable.dims if d not in (*dims, DIMENSION)]
+    front = [d for d in STOKES_AXES if d in variable.dims]
     values = np.asarray(variable.transpose(*front, DIMENSION, *here).values)
     head = values.shape[: values.ndim - len(here)]
     if shared and not here:

@@ -1,4 +1,8 @@
-"""The form of a map of parameters: its variables, what the numbers of status and flags mean, and an empty one."""
+"""The form of a map of parameters: its variables, what the numbers of status and flags mean, and an empty one.
+
+What stands at a pixel that nobody has come to yet can be no result: NaN, a count of -1, a flag and a status that say
+so.
+"""
 
 from __future__ import annotations
 
@@ -11,10 +15,10 @@ import numpy as np
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["FLAGS", "PENDING", "PixelStatus", "empty_map", "template"]
+__all__ = ["FLAGS", "PENDING", "UNFITTED", "PixelStatus", "empty_map", "template"]
 
-#: Status of a pixel that nobody has come to yet: what a store is filled with.
-PENDING = -1
+#: Status of a pixel that nobody has come to yet, and what it and the flag of its parameters are called.
+PENDING, UNFITTED = -1, "not_yet_fitted"
 
 
 class PixelStatus(enum.IntEnum):
@@ -29,7 +33,7 @@ class PixelStatus(enum.IntEnum):
 
 
 #: Bits of the flags of a parameter at a pixel.
-FLAGS = {"at_lower_bound": 1, "at_upper_bound": 2, "undetermined": 4}
+FLAGS = {"at_lower_bound": 1, "at_upper_bound": 2, "undetermined": 4, UNFITTED: 128}
 
 _ATTRIBUTES: dict[str, dict[str, Any]] = {
     "estimate": {"long_name": "value at the best optimum"},
@@ -41,8 +45,8 @@ _ATTRIBUTES: dict[str, dict[str, Any]] = {
     "starts": {"long_name": "starts that were followed", "units": "1"},
     "status": {
         "long_name": "what became of the pixel",
-        "flag_values": np.array([s.value for s in PixelStatus], dtype=np.int8),
-        "flag_meanings": " ".join(s.name.lower() for s in PixelStatus),
+        "flag_values": np.array([*(s.value for s in PixelStatus), PENDING], dtype=np.int8),
+        "flag_meanings": " ".join([*(s.name.lower() for s in PixelStatus), UNFITTED]),
     },
     "flags": {
         "long_name": "what limits a parameter",
@@ -50,17 +54,18 @@ _ATTRIBUTES: dict[str, dict[str, Any]] = {
         "flag_meanings": " ".join(FLAGS),
     },
 }
-#: Type and what stands where there is no value, of the variables in the order in which they are written: status last.
-_FILL: dict[str, tuple[type, Any]] = {
-    "estimate": (np.float64, np.nan),
-    "standard_error": (np.float64, np.nan),
-    "correlation": (np.float64, np.nan),
-    "chi2": (np.float64, np.nan),
-    "degrees_of_freedom": (np.int32, 0),
-    "optima": (np.int16, 0),
-    "starts": (np.int16, 0),
-    "flags": (np.uint8, 0),
-    "status": (np.int8, PENDING),
+#: Type, what stands at a pixel without a value, and at one that nobody has come to yet, of the variables in the order
+#: in which they are written: status last.
+_FILL: dict[str, tuple[type, Any, Any]] = {
+    "estimate": (np.float64, np.nan, np.nan),
+    "standard_error": (np.float64, np.nan, np.nan),
+    "correlation": (np.float64, np.nan, np.nan),
+    "chi2": (np.float64, np.nan, np.nan),
+    "degrees_of_freedom": (np.int32, 0, -1),
+    "optima": (np.int16, 0, -1),
+    "starts": (np.int16, 0, -1),
+    "flags": (np.uint8, 0, FLAGS[UNFITTED]),
+    "status": (np.int8, PENDING, PENDING),
 }
 _FRONT = {
     "estimate": ("parameter",),
@@ -80,7 +85,7 @@ def _variables(parameters: int, correlation: bool) -> dict[str, tuple[int, ...]]
 
 
 def empty_map(parameters: int, shape: Sequence[int], correlation: bool) -> dict[str, np.ndarray]:
-    """Arrays of a map or a block of one in which no pixel was looked at.
+    """Arrays of a map or a block of one in which no pixel has a value, to be filled.
 
     Parameters
     ----------
@@ -121,8 +126,8 @@ def template(
 
 
 def broadcast_map(parameters: int, shape: Sequence[int], correlation: bool) -> dict[str, np.ndarray]:
-    """What :func:`empty_map` gives, in no memory: one number stands for all."""
+    """Arrays of a map that nobody has come to yet, in no memory: one number stands for all."""
     return {
-        name: np.broadcast_to(_FILL[name][0](_FILL[name][1]), (*front, *shape))
+        name: np.broadcast_to(_FILL[name][0](_FILL[name][2]), (*front, *shape))
         for name, front in _variables(parameters, correlation).items()
     }

@@ -220,7 +220,7 @@ max_iterations, share, correlation
     def template(self) -> xr.Dataset:
         """The map before any pixel was fitted: its form, coordinates and attributes, in no memory.
 
-        Every value is NaN, and ``status`` is :data:`~pbrdf.inversion.parameter_map.layout.PENDING`.
+        Every value is NaN, every count -1, and ``status`` and ``flags`` say that nobody has come yet.
         """
         shape = [self._sizes[d] for d in self.dims]
         arrays = broadcast_map(len(self.space.free), shape, self.settings["correlation"])

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pbrdf.errors import DataError
+from pbrdf.inversion.parameter_map.layout import UNFITTED
 from pbrdf.models.parameters import shown_unit
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ _MOST_POINTS = 4000
 #: number means which.
 GOOD, WITHOUT = "converged", ("not_measured", "masked")
 #: What a pixel is that no worker has come to.
-PENDING = "pending"
+PENDING = UNFITTED
 #: Dimensions that are no pixels.
 _NO_PIXELS = ("parameter", "other")
 
@@ -221,8 +222,9 @@ class ShownMap:
         self.labels = labels_of(dataset)
         self.window = Window.of(dataset) if window is None else window
         status, flags = dataset["status"].attrs, dataset["flags"].attrs
-        self.states = [*str(status["flag_meanings"]).split(), PENDING]
-        self.codes = np.asarray(status["flag_values"]).ravel().astype(int)
+        said = str(status["flag_meanings"]).split()
+        self.states = [*(name for name in said if name != PENDING), PENDING]
+        self.codes = np.asarray(status["flag_values"]).ravel().astype(int)[[n != PENDING for n in said]]
         names = str(flags["flag_meanings"]).split()
         self.masks = dict(
             zip(names, np.asarray(flags["flag_masks"]).ravel().astype(int).tolist(), strict=True)
