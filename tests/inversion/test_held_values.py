@@ -194,6 +194,9 @@ def test_flakes_have_an_index_and_an_extinction_of_their_own():
         ({"n": "main/ink/n"}, None, "held at main/ink/n, but the data do not state the wavelength: state it"),
         ({"n": "main/ink/n"}, [550.0, np.nan], "the data do not state the wavelength of 1 geometries"),
         ({"n": np.array([1.5, 1.6])}, [450.0, 550.0], "n is held at a number, numbers by wavelength as"),
+        ({"n": {450: 1.5, "green": 1.6}}, [450.0], "n is held at a number, numbers by wavelength as"),
+        ({"n": {450: None}}, [450.0], "n is held at a number, numbers by wavelength as"),
+        ({"n": xr.Dataset({"n": 1.5})}, [450.0], "n is held at a number, numbers by wavelength as"),
         ({"n": {450: 1.5}}, None, "held at 1 values, but the data do not state the wavelength"),
         (
             {"n": {450: 1.5, 650: 1.4}},

@@ -6,6 +6,7 @@ side by side, and a map's arrays lie like that in files.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -256,7 +257,7 @@ class Stack:
         """Number of values that a model can tell apart, shape (B,): see :meth:`Observations.distinct`."""
         # three numbers in one: it differs where any of them does
         place = (
-            np.round(self.theta_i, 9) + np.pi * np.round(self.theta_r, 9) + np.e * rounded_azimuth(self.phi)
+            np.round(self.theta_i, 9) + np.pi * np.round(self.theta_r, 9) + math.e * rounded_azimuth(self.phi)
         )
         for column in (self.group, self.wavelength):
             if column is not None:
