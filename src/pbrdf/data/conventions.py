@@ -57,6 +57,11 @@ def real_array(values: ArrayLike, what: str, shape: tuple[int, ...]) -> NDArray[
     shape
         Of one vector or matrix: (4,) or (4, 4).
 
+    Returns
+    -------
+    ndarray
+        Shape (..., *shape); NaN where a complex number is not finite.
+
     Raises
     ------
     DataError
