@@ -118,6 +118,19 @@ def test_without_split_parameters():
     assert free.goodness.chi2 < same.goodness.chi2
 
 
+def test_one_geometry_at_several_wavelengths_is_several():
+    """I and Q of one direction tell three unknowns where n is another at each wavelength, and not where it is one."""
+    data = measured().isel(geometry=slice(4, None, 21)).drop_vars(["U", "U_std"])
+    assert len(set(zip(data["theta_i"].values, data["theta_r"].values, strict=True))) == 1
+    held = {"b": 0.2, "a": {w: 0.001 * w for w in DISPERSION}}
+    found = pbrdf.fit(data, fix={**held, **NUMBERS}, starts=4)
+    assert found.space.names == ["sigma", "k", "t"]
+    assert found.goodness.chi2 < 1e-6
+    same = {"b": 0.2, "a": 0.5, "n": 1.5}
+    with pytest.raises(FitError, match="6 values at 1 geometry cannot determine 3 parameters"):
+        pbrdf.fit(data, fix=same, starts=4)
+
+
 @pytest.mark.slow
 def test_a_wavelength_that_is_held_out_is_predicted_with_its_own_values():
     amplitudes = {w: 0.001 * w for w in DISPERSION}
