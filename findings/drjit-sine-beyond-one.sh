@@ -14,7 +14,7 @@ set -euo pipefail
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 python3 -m venv "$folder/venv"
-"$folder/venv/bin/pip" install --quiet --disable-pip-version-check drjit==1.5.0 karellen-llvm-core==23.1.4.post8 numpy
+"$folder/venv/bin/pip" install --quiet --disable-pip-version-check drjit==1.5.0 karellen-llvm-core==23.1.4.post8 numpy==2.4.6
 DRJIT_LIBLLVM_PATH=$(find "$folder/venv" -name 'libLLVM*.so*' | head -n 1)
 export DRJIT_LIBLLVM_PATH
 "$folder/venv/bin/python" - <<'PYTHON'

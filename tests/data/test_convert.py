@@ -116,6 +116,10 @@ def test_what_is_no_matrix_is_refused_and_nothing_is_broadcast(program):
     jones = np.full((2, 4, 4), 1 + 1e-17j)
     jones[1, 2, 2] = np.nan
     assert_array_equal(mueller(jones), mueller(jones.real))
+    jones[1, 2, 2] = complex(1.0, np.nan)
+    assert np.argwhere(np.isnan(mueller(jones))).tolist() == [[1, 2, 2]]
+    with pytest.raises(DataError, match="complex128"):
+        mueller(jones + np.where(np.isnan(jones), 0, 1e-3j))
     with pytest.raises(DataError, match=r"numpy.moveaxis\(x, \(0, 1\), \(-2, -1\)\)"):
         mueller(np.ones((4, 4, 3)))
     if program != "pyelli":

@@ -118,6 +118,19 @@ def test_without_split_parameters():
     assert free.goodness.chi2 < same.goodness.chi2
 
 
+def test_one_geometry_at_several_wavelengths_is_several():
+    """I and Q of one direction tell three unknowns where n is another at each wavelength, and not where it is one."""
+    data = measured().isel(geometry=slice(4, None, 21)).drop_vars(["U", "U_std"])
+    assert len(set(zip(data["theta_i"].values, data["theta_r"].values, strict=True))) == 1
+    held = {"b": 0.2, "a": {w: 0.001 * w for w in DISPERSION}}
+    found = pbrdf.fit(data, fix={**held, **NUMBERS}, start={"sigma": 0.1, "k": 1.0, "t": 0.4}, starts=4)
+    assert found.space.names == ["sigma", "k", "t"]
+    assert found.goodness.chi2 < 1e-6
+    same = {"b": 0.2, "a": 0.5, "n": 1.5}
+    with pytest.raises(FitError, match="6 values at 1 geometry cannot determine 3 parameters"):
+        pbrdf.fit(data, fix=same, starts=1)
+
+
 @pytest.mark.slow
 def test_a_wavelength_that_is_held_out_is_predicted_with_its_own_values():
     amplitudes = {w: 0.001 * w for w in DISPERSION}
@@ -194,6 +207,9 @@ def test_flakes_have_an_index_and_an_extinction_of_their_own():
         ({"n": "main/ink/n"}, None, "held at main/ink/n, but the data do not state the wavelength: state it"),
         ({"n": "main/ink/n"}, [550.0, np.nan], "the data do not state the wavelength of 1 geometries"),
         ({"n": np.array([1.5, 1.6])}, [450.0, 550.0], "n is held at a number, numbers by wavelength as"),
+        ({"n": {450: 1.5, "green": 1.6}}, [450.0], "n is held at a number, numbers by wavelength as"),
+        ({"n": {450: None}}, [450.0], "n is held at a number, numbers by wavelength as"),
+        ({"n": xr.Dataset({"n": 1.5})}, [450.0], "n is held at a number, numbers by wavelength as"),
         ({"n": {450: 1.5}}, None, "held at 1 values, but the data do not state the wavelength"),
         (
             {"n": {450: 1.5, 650: 1.4}},

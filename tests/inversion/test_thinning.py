@@ -52,6 +52,20 @@ def test_the_part_keeps_the_lobe_and_its_weights_stand_for_all():
     assert misfit[0] == pytest.approx(misfit[1], rel=0.1)
 
 
+def test_wavelengths_with_held_values_of_their_own_are_all_drawn():
+    """A wavelength of few geometries keeps them, in weight too, as its values are not those of the others."""
+    ds = dense(20_000)
+    ds = ds.assign_coords(wavelength=("geometry", np.where(np.arange(20_000) % 400, 550.0, 450.0)))
+    data = Observations.from_dataset(ds)
+    weights = []
+    for held in ({450: 1.6, 550: 1.5}, 1.5):
+        space, _ = space_of("double-gauss", {}, {"n": held}, (), {}, {}, data)
+        part = thinning.draw(space, data)
+        weights.append(part.weight[data.wavelength[part.rows] == 450.0].sum())
+    assert weights[0] == pytest.approx(50, abs=1e-9) and len(part.rows) == thinning.ENOUGH
+    assert weights[1] != pytest.approx(50, rel=0.1)
+
+
 def test_what_was_not_measured_is_not_drawn_and_every_split_is():
     space, data = problem(dense(20_000), split={"a": "group"})
     hidden = np.arange(20_000) % 2 == 0

@@ -98,10 +98,9 @@ def compare(
     """
     from pbrdf.files.digest import sha256_of
     from pbrdf.report.comparison.folder import write_comparison
-    from pbrdf.report.style import FIGURE_FORMATS, leave_out_help_texts
+    from pbrdf.report.style import check_figure_format, leave_out_help_texts
 
-    if figure_format not in FIGURE_FORMATS:
-        raise PbrdfError(f"--figure-format {figure_format!r}: choose one of {', '.join(FIGURE_FORMATS)}")
+    check_figure_format(figure_format, "--figure-format")
     if hold_out is not None and (by is not None or folds is not None):
         raise PbrdfError("--hold-out leaves data out once, --by and --folds all in turn: give one of the two")
     names = None if models is None else [name.strip() for name in models.split(",") if name.strip()]

@@ -151,7 +151,7 @@ def identify(
     """
     from pbrdf.files.atomic import require_writable_folder
     from pbrdf.identification.identify import check_request, shares
-    from pbrdf.report.style import FIGURE_FORMATS, leave_out_help_texts
+    from pbrdf.report.style import check_figure_format, leave_out_help_texts
 
     sources = list(data or ())
     if not sources and calibrate is None and labelled is None:
@@ -172,8 +172,7 @@ def identify(
         )
     if smoothing and not sources:
         raise PbrdfError("--smoothing is for maps: leave it out")
-    if figure_format not in FIGURE_FORMATS:
-        raise PbrdfError(f"--figure-format {figure_format!r}: choose one of {', '.join(FIGURE_FORMATS)}")
+    check_figure_format(figure_format, "--figure-format")
     if gain is not None and gain not in _GAINS:
         raise PbrdfError(f"--gain {gain!r}: choose known or unknown")
     if angle == 0.0:

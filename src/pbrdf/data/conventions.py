@@ -57,6 +57,11 @@ def real_array(values: ArrayLike, what: str, shape: tuple[int, ...]) -> NDArray[
     shape
         Of one vector or matrix: (4,) or (4, 4).
 
+    Returns
+    -------
+    ndarray
+        Shape (..., *shape); NaN where a complex number is not finite.
+
     Raises
     ------
     DataError
@@ -64,9 +69,11 @@ def real_array(values: ArrayLike, what: str, shape: tuple[int, ...]) -> NDArray[
     """
     array = np.asarray(values)
     if array.dtype.kind == "c":
-        largest = np.nan_to_num(abs(array.real)).max(initial=0.0)
-        if not (abs(array.imag) > _ROUNDING * largest).any():
-            array = array.real
+        finite = np.isfinite(array)
+        largest = abs(array.real).max(initial=0.0, where=finite)
+        if not (abs(array.imag) > _ROUNDING * largest).any(where=finite):
+            # what is not finite in either part is not a number
+            array = np.where(finite, array.real, np.nan)
     wanted = f"(..., {', '.join(map(str, shape))})"
     if array.shape[-len(shape) :] != shape or array.dtype.kind not in "fiu":
         message = f"{what} are real numbers of the shape {wanted}; these are {array.dtype} of {array.shape}"

@@ -158,7 +158,7 @@ def fit(
             f"{fitted_data.count} measured values cannot determine {len(space.free)} parameters: measure "
             "more, hold out less, or fix parameters"
         )
-    split_by = space.labels("group") != [], space.labels("wavelength") != []
+    split_by = space.labels("group") != [], space.wavelengths != []
     # mostly the first few show that there are enough
     places, distinct = fitted_data.subset(slice(_FEW)).distinct(*split_by)
     if distinct < len(space.free):

@@ -18,6 +18,9 @@ __all__ = ["NEGLIGIBLE", "Held", "HeldValues", "held_values", "in_words"]
 Held = float | str | Mapping[float, float]
 #: The extinction of a material may be left out where it changes the reflectance at normal incidence by less, relative.
 NEGLIGIBLE = 0.01
+_WANTED = (
+    "is held at a number, numbers by wavelength as {450: 1.52, 550: 1.51}, or a page of refractiveindex.info"
+)
 
 
 @dataclass(frozen=True)
@@ -79,10 +82,7 @@ def held_values(
             try:
                 found.fixed[name] = float(given)
             except TypeError:
-                raise FitError(
-                    f"fix: {name} is held at a number, numbers by wavelength as {{450: 1.52, 550: 1.51}}, or a page of "
-                    "refractiveindex.info"
-                ) from None
+                raise FitError(f"fix: {name} {_WANTED}") from None
             continue
         wavelengths = _known(name, given, wavelength)
         if isinstance(given, str):
@@ -113,8 +113,11 @@ def _known(name: str, given: str | Mapping[float, float], wavelength: np.ndarray
 
 def _numbers(name: str, given: Mapping[float, float], wavelengths: np.ndarray) -> list[float]:
     """The number of each wavelength."""
-    keys = np.array(sorted(map(float, given)))
-    by_key = {float(key): float(value) for key, value in given.items()}
+    try:
+        by_key = {float(key): float(value) for key, value in given.items()}
+    except (TypeError, ValueError):
+        raise FitError(f"fix: {name} {_WANTED}") from None
+    keys = np.array(sorted(by_key))
     numbers = []
     for wavelength in wavelengths.tolist():
         distance = np.abs(keys - wavelength)

@@ -203,7 +203,7 @@ class Observations:
     def distinct(self, by_group: bool = False, by_wavelength: bool = False) -> tuple[int, int]:
         """Numbers of different geometries, and of different values of a model there: one for each measured channel.
 
-        Groups and wavelengths make a difference where the model has parameters of its own for them.
+        Groups and wavelengths make a difference where parameters are free, or held, for each.
         """
         measured = np.isfinite(self.std)
         used = measured.any(axis=0)

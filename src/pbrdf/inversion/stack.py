@@ -6,6 +6,7 @@ side by side, and a map's arrays lie like that in files.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -254,13 +255,13 @@ class Stack:
 
     def different_values(self) -> np.ndarray:
         """Number of values that a model can tell apart, shape (B,): see :meth:`Observations.distinct`."""
-        # three numbers in one: it differs where any of them does
+        # several numbers in one: it differs where any of them does
         place = (
-            np.round(self.theta_i, 9) + np.pi * np.round(self.theta_r, 9) + np.e * rounded_azimuth(self.phi)
+            np.round(self.theta_i, 9) + np.pi * np.round(self.theta_r, 9) + math.e * rounded_azimuth(self.phi)
         )
-        for column in (self.group, self.wavelength):
+        for factor, column in ((math.sqrt(2.0), self.group), (math.sqrt(3.0), self.wavelength)):
             if column is not None:
-                place = place + np.sqrt(2.0) * np.unique(column, return_inverse=True)[1][:, None]
+                place = place + factor * np.unique(column, return_inverse=True)[1][:, None]
         measured = np.isfinite(self.std)
         if place.shape[1] == 1 and len(np.unique(place)) == len(place):
             values: np.ndarray = measured.sum(axis=(0, 1))

@@ -1,8 +1,8 @@
 """Part of a dense data set that stands for all of it: what many starts search, before the best see every geometry.
 
 Geometries are drawn evenly over strata of direction (tilt of the mirroring facet on a logarithmic scale, so that a
-narrow lobe keeps its points; θ_i; θ_r) and of the groups or wavelengths that have unknowns of their own. Each counts
-for those of its stratum that were left out, so χ² of the part estimates χ² of all.
+narrow lobe keeps its points; θ_i; θ_r) and of the groups or wavelengths that have unknowns, or held values, of their
+own. Each counts for those of its stratum that were left out, so χ² of the part estimates χ² of all.
 """
 
 from __future__ import annotations
@@ -91,7 +91,7 @@ def _strata(space: Space, data: Observations, used: np.ndarray) -> np.ndarray:
     tilt = np.rad2deg(facet_tilt(data.theta_i[used], data.theta_r[used], data.phi[used]))
     columns = [np.digitize(tilt, _TILT)]
     columns += [np.digitize(np.rad2deg(angle[used]), _ZENITH) for angle in (data.theta_i, data.theta_r)]
-    for split in ("group", "wavelength"):
-        if space.labels(split):
-            columns.append(np.unique(getattr(data, split)[used], return_inverse=True)[1])
+    for own, labels in ((space.labels("group"), data.group), (space.wavelengths, data.wavelength)):
+        if own and labels is not None:
+            columns.append(np.unique(labels[used], return_inverse=True)[1])
     return np.unique(np.stack(columns, axis=1), axis=0, return_inverse=True)[1].ravel()

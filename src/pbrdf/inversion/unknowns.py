@@ -100,9 +100,8 @@ def space_of(
         sources=held.sources,
     )
     for label in space.wavelengths or [None]:
-        space.build(
-            space.lower, label
-        )  # raises ModelError for a fixed value or a bound outside the model's domain
+        # raises ModelError for a fixed value or a bound outside the model's domain
+        space.build(space.lower, label)
         space.build(space.upper, label)
     return space, begin
 

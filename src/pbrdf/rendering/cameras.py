@@ -82,15 +82,9 @@ def _members(sensor: Any) -> list[Any]:
             super().__init__()
             self.found: list[Any] = []
 
-        def put_object(self, name: str, thing: Any, flags: int) -> None:
+        def put(self, name: str, thing: Any, flags: int, kind: Any = None) -> None:
             if isinstance(thing, mi.Sensor):
                 self.found.append(thing)
-
-        def put_value(self, name: str, pointer: Any, flags: int, kind: Any) -> None:
-            pass
-
-        def put(self, name: str, thing: Any, flags: int, kind: Any = None) -> None:
-            self.put_object(name, thing, flags)
 
     members = Members()
     sensor.traverse(members)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pbrdf.errors import DataError
+from pbrdf.errors import DataError, PbrdfError
 from pbrdf.files.atomic import atomic_file
 
 if TYPE_CHECKING:
@@ -28,6 +28,7 @@ __all__ = [
     "GREY",
     "RED",
     "Look",
+    "check_figure_format",
     "figure_bytes",
     "leave_out_help_texts",
     "looks_of",
@@ -72,6 +73,12 @@ FIGURE_FORMATS: dict[str, dict[str, Any]] = {
     "pdf": {"metadata": {"CreationDate": None}},
     "svg": {"metadata": {"Date": None}},
 }
+
+
+def check_figure_format(text: str, option: str = "figure_format") -> None:
+    """Raise PbrdfError unless this is one of :data:`FIGURE_FORMATS`; ``option`` names what it was given for."""
+    if text not in FIGURE_FORMATS:
+        raise PbrdfError(f"{option} {text!r}: choose one of {', '.join(FIGURE_FORMATS)}")
 
 
 @contextmanager

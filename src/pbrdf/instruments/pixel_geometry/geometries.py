@@ -20,7 +20,7 @@ from pbrdf.data.build import make_dataset
 from pbrdf.data.schema import COVARIANCE, DIMENSION
 from pbrdf.errors import DataError
 from pbrdf.instruments.pixel_geometry.labels import label_names
-from pbrdf.optics.angles import within_turn
+from pbrdf.optics.angles import within_half_turn, within_turn
 from pbrdf.optics.stokes import STOKES
 
 __all__ = ["BIN", "as_geometries"]
@@ -222,7 +222,7 @@ def _binned(pixels: _Pixels, width: float) -> _Pixels:
 
     # from the first of each bin, so that the turn from 360° to 0° does no harm
     off = pixels.angles - pixels.angles[first][number]
-    off[:, 2] = np.mod(off[:, 2] + np.pi, 2.0 * np.pi) - np.pi
+    off[:, 2] = within_half_turn(off[:, 2])
     shift = mean(off)
     angles = pixels.angles[first] + shift
     weight = np.sqrt(np.maximum(np.sin(angles[:, 0]) * np.sin(angles[:, 1]), 0.0))

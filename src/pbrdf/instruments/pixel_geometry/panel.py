@@ -20,6 +20,7 @@ from pbrdf.instruments.pixel_geometry.geometry import (
     lit_angles,
     require_series,
 )
+from pbrdf.optics.angles import within_half_turn
 
 __all__ = ["Panel"]
 
@@ -193,7 +194,7 @@ def _placed(
 def _require_same(name: str, stated: np.ndarray, carried: np.ndarray) -> None:
     """Raise if an angle is stated that the pictures have, and otherwise."""
     if stated.size in (1, carried.size):
-        off = (stated - carried + math.pi) % (2.0 * math.pi) - math.pi
+        off = within_half_turn(stated - carried)
         # NaN is not known
         if not (np.abs(off) > _SAME).any():
             return

@@ -22,8 +22,8 @@ UNKNOWN_RETARDANCE = 10.0
 #: Values and standard errors of each series, by the name of a quantity.
 Properties = dict[str, tuple[np.ndarray, np.ndarray]]
 
-#: Period of the one quantity that has no first and no last value, degrees.
-_HALF_TURN = 180.0
+#: Half the period of the one quantity that has no first and no last value, degrees.
+_QUARTER_TURN = 90.0
 
 
 def mueller_properties(means: MuellerMeans) -> Properties:
@@ -52,7 +52,7 @@ def mueller_properties(means: MuellerMeans) -> Properties:
     for name, values in at.items():
         change = values[:, 1:] - values[:, :1]
         if name == "fast_axis_deg":
-            change = (change + 0.5 * _HALF_TURN) % _HALF_TURN - 0.5 * _HALF_TURN
+            change = within_half_turn(change, _QUARTER_TURN)
         # the mean of the two squares is that of the half difference where the quantity is linear
         found[name] = values[:, 0], np.sqrt(0.5 * np.square(change).sum(axis=1))
     return found
@@ -65,7 +65,7 @@ def _quantities(matrices: np.ndarray) -> dict[str, np.ndarray]:
         "polarizance": parts.polarizance,
         "retardance_deg": np.rad2deg(parts.retardance),
         "fast_axis_deg": within_half_turn(
-            0.5 * np.rad2deg(np.arctan2(parts.fast_axis[..., 1], parts.fast_axis[..., 0])), 0.5 * _HALF_TURN
+            0.5 * np.rad2deg(np.arctan2(parts.fast_axis[..., 1], parts.fast_axis[..., 0])), _QUARTER_TURN
         ),
         "depolarization": parts.depolarization,
         "depolarization_index": depolarization_index(matrices),

@@ -12,6 +12,7 @@ from pbrdf.data.conventions import qu_from_dolp_aolp
 from pbrdf.data.covariance import correlations
 from pbrdf.data.schema import COVARIANCE, with_group
 from pbrdf.data.select import to_brdf_scale
+from pbrdf.optics.angles import within_half_turn
 from pbrdf.report.dataset.quantities import Channel, polarised_quantities
 
 if TYPE_CHECKING:
@@ -88,11 +89,10 @@ class Points:
             with np.errstate(divide="ignore", invalid="ignore"):
                 value = np.hypot(stokes[1], np.nan_to_num(stokes[2])) / stokes[0]
             dolp = Channel(value, dolp_uncertainty(*stokes, *std, correlation=error_correlation(ds)))
-        phi = np.rad2deg(ds["phi"].values)
         return cls(
             theta_i=np.rad2deg(ds["theta_i"].values),
             theta_r=np.rad2deg(ds["theta_r"].values),
-            phi=180.0 - (180.0 - phi) % 360.0,
+            phi=within_half_turn(np.rad2deg(ds["phi"].values), 180.0),
             group=with_group(ds)["group"].values.astype(str),
             intensity=Channel(stokes[0], std[0]),
             dolp=dolp,

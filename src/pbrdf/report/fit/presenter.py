@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,15 +16,13 @@ from pbrdf.report.fit.figure import fit_figure
 from pbrdf.report.fit.folder import parse_formats, write_report
 from pbrdf.report.fit.subject import Report
 from pbrdf.report.fit.summary import summary_text, value_in_words, verdict_in_words
+from pbrdf.report.notebook import notebook_html, title_of
 from pbrdf.report.numbers import brief, per_cent
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 __all__ = ["figure", "html", "save", "summary"]
-
-#: What data without a title are called.
-_UNNAMED = "data"
 
 
 def summary(result: FitResult, *, verbose: bool = False) -> str:
@@ -37,13 +34,11 @@ def html(result: FitResult) -> str:
     """A table of the parameters, and in a line each how well they describe and predict the data."""
     verdict = result.verdict()
     described = verdict.level.usable
-    rows = "".join(_row(name, estimate, described) for name, estimate in result.estimates.items())
-    head = "".join(f"<th>{title}</th>" for title in ("parameter", "value", "unit", "verdict", "meaning"))
-    sentences = [f"{result.model.name} fitted to {result.goodness.data} values of {_name(result)}"]
-    sentences += _errors("fitted", result.fitted) + _errors("held out, predicted", result.predicted)
-    lines = "".join(f"<p>{escape(sentence)}</p>" for sentence in [*sentences, *result.notes])
-    first = f"<p>{escape(verdict.sentence)}</p>"
-    return f"<div>{first}<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>{lines}</div>"
+    rows = [_row(name, estimate, described) for name, estimate in result.estimates.items()]
+    lines = [f"{result.model.name} fitted to {result.goodness.data} values of {title_of(result.dataset)}"]
+    lines += _errors("fitted", result.fitted) + _errors("held out, predicted", result.predicted)
+    headings = ("parameter", "value", "unit", "verdict", "meaning")
+    return notebook_html(verdict.sentence, headings, rows, [*lines, *result.notes])
 
 
 def figure(result: FitResult) -> Figure:
@@ -60,11 +55,7 @@ def save(result: FitResult, folder: Path, figure_format: str = "png") -> list[Pa
 
 def _report(result: FitResult, *, checked: bool = True) -> Report:
     checks = run_checks(result, result.dataset) if checked else None
-    return Report(result, result.dataset, _name(result), checks=checks)
-
-
-def _name(result: FitResult) -> str:
-    return str(result.dataset.attrs.get("title") or _UNNAMED)
+    return Report(result, result.dataset, title_of(result.dataset), checks=checks)
 
 
 def _errors(what: str, by_region: dict[str, Prediction]) -> list[str]:
@@ -82,13 +73,12 @@ def _errors(what: str, by_region: dict[str, Prediction]) -> list[str]:
     return [f"{what}: {', '.join(parts)}"] if parts else []
 
 
-def _row(name: str, estimate: Estimate, described: bool) -> str:
+def _row(name: str, estimate: Estimate, described: bool) -> list[str]:
     _, unit = shown_unit(estimate.parameter)
-    cells = (
+    return [
         name,
         value_in_words(estimate),
         unit,
         verdict_in_words(estimate, described=described),
         estimate.parameter.description,
-    )
-    return f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in cells)}</tr>"
+    ]
