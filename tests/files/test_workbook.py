@@ -122,6 +122,21 @@ def write_ods(path, sheets):
         )
 
 
+#: A row with the text "far" alone.
+FAR = '<table:table-row><table:table-cell office:value-type="string"><text:p>far</text:p>'
+
+
+def change_part(path, name, old, new, behind=""):
+    """Replace text within a part of a workbook, and put some behind it."""
+    with zipfile.ZipFile(path) as archive:
+        parts = {part: archive.read(part).decode() for part in archive.namelist()}
+    assert old in parts[name]
+    parts[name] = parts[name].replace(old, new, 1) + behind
+    with zipfile.ZipFile(path, "w") as archive:
+        for part, content in parts.items():
+            archive.writestr(part, content)
+
+
 TABLE = [
     ["theta_i", "theta_r", "phi", "brdf"],
     ["deg", "deg", "deg", "1/sr"],
@@ -248,6 +263,35 @@ def test_a_cell_far_away_is_told_instead_of_filling_the_memory(tmp_path, monkeyp
         read_table(path)
     write_xlsx(path, {"Data": [*TABLE, *[[None]] * 200, [None, None, 10.0, None]]})
     assert len(read_table(path)) == 3
+
+
+def test_cells_of_an_open_document_that_are_repeated_far_away_are_told(tmp_path, monkeypatch):
+    path = tmp_path / "t.ods"
+    monkeypatch.setattr("pbrdf.files.workbook._MOST_CELLS", 1000)
+    write_ods(path, {"Data": [*TABLE, ["far"]]})
+    change_part(path, "content.xml", FAR, FAR.replace("row", 'row table:number-rows-repeated="400"', 1))
+    with pytest.raises(DataError, match=r"t\.ods: a sheet reaches to row 404 and column 4, mostly empty"):
+        read_table(path)
+    # what a spreadsheet program writes below and beside the last cell
+    write_ods(path, {"Data": [*TABLE, [None]]})
+    empty = FAR.partition("<table:table-cell")[0]
+    repeated = (
+        '<table:table-row table:number-rows-repeated="1048572">'
+        '<table:table-cell table:number-columns-repeated="16384"/>'
+    )
+    change_part(path, "content.xml", f"{empty}<table:table-cell/>", repeated)
+    assert len(read_table(path)) == 2
+
+
+def test_a_part_of_a_workbook_that_is_no_xml_is_named(tmp_path):
+    for path, part, write in (
+        (tmp_path / "t.ods", "content.xml", write_ods),
+        (tmp_path / "t.xlsx", "xl/worksheets/sheet1.xml", write_xlsx),
+    ):
+        write(path, {"Data": TABLE})
+        change_part(path, part, "", "", behind="<open>")
+        with pytest.raises(DataError, match=rf"{path.name}: cannot be read as .* its part {part} is damaged"):
+            read_table(path)
 
 
 def test_the_example_of_a_stranger(measured):

@@ -18,6 +18,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
+from xml.parsers import expat
 
 from pbrdf.errors import DataError
 from pbrdf.files.numbers import to_number
@@ -33,6 +34,9 @@ _ERROR = re.compile(rb'<c\b[^>]*?\bt="e"[^>]*>.*?</c>', re.DOTALL)
 _PLACE = re.compile(rb'\br="([A-Z]{1,3})([0-9]{1,7})"')
 _VALUE = re.compile(rb"<v>([^<]*)</v>")
 _WIDE = re.compile(rb'<c\b[^>]*?\br="[A-Z]{3}[0-9]')
+_REPEATED = re.compile(rb'number-(?:rows|columns)-repeated="[0-9]{3}')
+#: The parts that calamine parses.
+_PARSED = re.compile(r"content\.xml|xl/(?:workbook|sharedStrings|styles|worksheets/[^/]+)\.xml")
 _ROW = re.compile(rb'<row\b[^>]*?\br="([0-9]{1,7})"')
 
 
@@ -99,8 +103,13 @@ def _archive(path: Path, raw: bytes) -> zipfile.ZipFile:
             f"{path}: it unpacks to {size / 2**30:.0f} GiB, more than any workbook; it is not read"
         )
     for part in archive.namelist():
-        if re.fullmatch(r"xl/worksheets/[^/]+\.xml", part):
-            xml = _part(archive, part)
+        if not _PARSED.fullmatch(part):
+            continue
+        xml = _part(archive, part)
+        _require_well_formed(path, part, xml)
+        if part == "content.xml" and _REPEATED.search(xml):
+            _require_small(path, *_open_document_extent(xml))
+        if part.startswith("xl/worksheets/"):
             at = xml.rfind(b"<row")
             last = _ROW.match(xml, at) if at >= 0 else None
             columns = 26**3 if _WIDE.search(xml) else 26 + 26**2
@@ -113,10 +122,57 @@ def _require_extent(path: Path, xml: bytes) -> None:
     """Refuse a sheet with a cell so far away that those before it fill the memory."""
     places = [_position(place) for place in _PLACE.finditer(xml)]
     rows, columns = (max((place[axis] for place in places), default=0) + 1 for axis in (0, 1))
+    _require_small(path, rows, columns)
+
+
+def _require_small(path: Path, rows: int, columns: int) -> None:
     if rows * columns > _MOST_CELLS:
         raise DataError(
             f"{path}: a sheet reaches to row {rows} and column {columns}, mostly empty; delete what stands far away"
         )
+
+
+def _require_well_formed(path: Path, part: str, xml: bytes) -> None:
+    """Refuse a part that is no XML: over some of these calamine does not come to an end."""
+    try:
+        expat.ParserCreate().Parse(xml, True)
+    except expat.ExpatError as error:
+        raise DataError(
+            f"{path}: cannot be read as a workbook: its part {part} is damaged ({error}); is it complete?"
+        ) from None
+
+
+def _open_document_extent(xml: bytes) -> tuple[int, int]:
+    """Rows and columns up to the last cell that is not empty, of the sheet of an ``.ods`` that needs the most cells.
+
+    Source: OpenDocument 1.3, part 3, 19.675 and 19.679: cells and rows may say how often they are repeated.
+    """
+    sizes = [(0, 0)]
+    rows = used_rows = columns = used_columns = widest = 0
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        nonlocal rows, used_rows, columns, used_columns, widest
+        if tag == "table:table":
+            rows = used_rows = widest = 0
+        elif tag == "table:table-row":
+            columns = used_columns = 0
+            rows += int(attributes.get("table:number-rows-repeated", 1))
+        elif tag in ("table:table-cell", "table:covered-table-cell"):
+            columns += int(attributes.get("table:number-columns-repeated", 1))
+            if any(name.startswith("office:") or name == "table:formula" for name in attributes):
+                used_columns = columns
+
+    def end(tag: str) -> None:
+        nonlocal used_rows, widest
+        if tag == "table:table-row" and used_columns:
+            used_rows, widest = rows, max(widest, used_columns)
+        elif tag == "table:table":
+            sizes.append((used_rows, widest))
+
+    parser = expat.ParserCreate()
+    parser.StartElementHandler, parser.EndElementHandler = start, end
+    parser.Parse(xml, True)
+    return max(sizes, key=lambda size: size[0] * size[1])
 
 
 def _part(archive: zipfile.ZipFile, name: str) -> bytes:
