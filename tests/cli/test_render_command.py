@@ -249,7 +249,9 @@ def test_a_fit_with_parameters_of_each_wavelength_paints_in_colour(fit_of_colour
     np.testing.assert_allclose(
         [m.values["a"] / paint.values["a"] for m in models], [450 / 550, 1.0, 650 / 550], rtol=0.02
     )
-    np.testing.assert_allclose([m.values["n"] - paint.values["n"] for m in models], [0.01, 0.0, -0.01], atol=1e-9)
+    np.testing.assert_allclose(
+        [m.values["n"] - paint.values["n"] for m in models], [0.01, 0.0, -0.01], atol=1e-9
+    )
     with pytest.raises(PbrdfError, match="has parameters at 450, 550, 650 nm"):
         painted_with([source], [470.0])
 
@@ -269,8 +271,9 @@ def test_a_fit_with_parameters_of_each_wavelength_paints_in_colour(fit_of_colour
 )
 def test_no_command_takes_the_first_wavelength_of_a_fit_for_all(refused, fit_of_colours, arguments):
     command, _, *rest = arguments
-    assert "this fit has a model of each of 3 wavelengths, 450, 550, 650 nm: choose one with --wavelength" in (
-        refused(command, str(fit_of_colours), *rest)
+    assert (
+        "this fit has a model of each of 3 wavelengths, 450, 550, 650 nm: choose one with --wavelength"
+        in (refused(command, str(fit_of_colours), *rest))
     )
 
 

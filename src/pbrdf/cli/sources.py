@@ -79,24 +79,23 @@ def models_at(source: str, wavelengths: Sequence[float | None]) -> list[Model] |
         return None
     from pbrdf.inversion.stored_result import load_fit
 
-    result = load_fit(folder)
-    known = [float(label) for label in result.space.wavelengths]
+    known = load_fit(folder).models
     if not known:
         return None
     few = ", ".join(f"{one:g}" for one in known)
-    values = [result.estimates[name].value for name in result.space.names]
     models = []
     for wanted in wavelengths:
         if wanted is None:
-            shown = few if len(known) < 6 else f"{known[0]:g} … {known[-1]:g}"
+            first, last = min(known), max(known)
+            shown = few if len(known) < 6 else f"{first:g} … {last:g}"
             raise PbrdfError(
                 f"{source}: this fit has a model of each of {len(known)} wavelengths, {shown} nm: choose one with "
-                f"--wavelength; {folder / 'model.json'} is that of {known[0]:g} nm"
+                f"--wavelength; {folder / 'model.json'} is that of {next(iter(known)):g} nm"
             )
-        label = min(result.space.wavelengths, key=lambda one: abs(float(one) - wanted))
-        if not abs(float(label) - wanted) <= _SAME:
+        nearest = min(known, key=lambda one: abs(one - wanted))
+        if not abs(nearest - wanted) <= _SAME:
             raise PbrdfError(f"--wavelength {wanted:g}: {source} has parameters at {few} nm")
-        models.append(result.space.build(values, label=label))
+        models.append(known[nearest])
     return models
 
 

@@ -116,8 +116,8 @@ class Workspace:
 
     def add_fit(self, name: str, result: FitResult) -> None:
         """Open a fit: its model, of several wavelengths that of the first, and its data, too."""
-        wavelengths = result.space.wavelengths
-        self.add_model(f"{name} at {wavelengths[0]:g} nm" if wavelengths else name, result.model)
+        first = next(iter(result.models), None)
+        self.add_model(name if first is None else f"{name} at {first:g} nm", result.model)
         self.add_dataset(name, result.dataset)
         self.fits.append((_free(name, self.fits), result))
 
