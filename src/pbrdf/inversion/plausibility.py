@@ -103,7 +103,8 @@ def _energy(result: Optimum, attributes: dict[Any, Any]) -> Finding:
     }
     at, reflectance = max(reflectances.items(), key=lambda item: float(item[1].max()))
     worst = int(np.argmax(reflectance))
-    largest = f"The model reflects at most {reflectance[worst]:.3g} of natural light (at θ_i = {INCIDENCES[worst]}°{at})"
+    where = f"at θ_i = {INCIDENCES[worst]}°{at}"
+    largest = f"The model reflects at most {reflectance[worst]:.3g} of natural light ({where})"
     gain = any(term.nuisance and term.role == "gain" for term in result.space.terms)
     unknown = _unknown_scale(attributes)
     if not {"I", "m00"} & set(result.data.channels):
