@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from pbrdf.cli.console import warn
 from pbrdf.errors import PbrdfError
 
 if TYPE_CHECKING:
@@ -79,7 +80,12 @@ def models_at(source: str, wavelengths: Sequence[float | None]) -> list[Model] |
         return None
     from pbrdf.inversion.stored_result import load_fit
 
-    known = load_fit(folder).models
+    result = load_fit(folder)
+    terms = [term for term in result.space.terms if term.split == "group" and not term.nuisance]
+    if terms:
+        names = ", ".join(dict.fromkeys(term.role for term in terms))
+        warn(f"{source}: {names} of its own in each group: this is the model of the first, {terms[0].label}")
+    known = result.models
     if not known:
         return None
     few = ", ".join(f"{one:g}" for one in known)
