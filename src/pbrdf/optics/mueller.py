@@ -137,8 +137,9 @@ def matrices_of(mueller: Any) -> tuple[np.ndarray, Callable[..., Any]]:
         )
     labels = list("IQUV")
     for dim in own:
+        given = mueller[dim].values.tolist() if dim in mueller.coords else labels
         # other labels, numbers for instance, are taken in their order
-        if dim in mueller.coords and sorted(map(str, mueller[dim].values)) == labels:
+        if given != labels and sorted(map(str, given)) == labels:
             mueller = mueller.sel({dim: labels})
     labelled = mueller.transpose(..., *own)
     leading = labelled.isel(dict.fromkeys(own, 0), drop=True)
