@@ -81,7 +81,7 @@ def groups_of_shapes(scene: Any) -> list[Any]:
     return [shape for shape in parts_of(scene, mi.Shape) if "ShapeGroup" in shape.class_name()]
 
 
-def parts_of(thing: Any, kind: Any) -> list[Any]:
+def parts_of(thing: Any, wanted: Any) -> list[Any]:
     """The objects of a kind that a scene, a ``batch`` of sensors or a group of shapes consists of."""
     import mitsuba as mi
 
@@ -90,15 +90,9 @@ def parts_of(thing: Any, kind: Any) -> list[Any]:
             super().__init__()
             self.found: list[Any] = []
 
-        def put_object(self, name: str, thing: Any, flags: int) -> None:
-            if isinstance(thing, kind):
-                self.found.append(thing)
-
-        def put_value(self, name: str, pointer: Any, flags: int, kind: Any) -> None:
-            pass
-
         def put(self, name: str, thing: Any, flags: int, kind: Any = None) -> None:
-            self.put_object(name, thing, flags)
+            if isinstance(thing, wanted):
+                self.found.append(thing)
 
     parts = Parts()
     thing.traverse(parts)
