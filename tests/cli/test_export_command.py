@@ -122,7 +122,7 @@ def test_the_folder_of_a_fit_is_a_model(run, tmp_path, models):
         (["white", "--format", "merl", "--wavelength", "476"], "a merl file states no wavelength"),
         (["white", "cd-back"], "2 models: state the wavelength of each"),
         (["white", "cd-back", "--format", "merl"], "2 models for a MERL table"),
-        (["white", "cd-back", "--wavelength", "476"], "2 models and 1 wavelengths"),
+        (["white", "cd-back", "--wavelength", "476"], "models are given 2, wavelengths 1"),
         (["white", "--wavelength", "632.8"], "632.8 nm, it holds whole nanometres"),
         (["white"] * 6 + [w for i in range(6) for w in ("--wavelength", 450 + i)], "has room for 5 and reads beyond"),
         (["white", "--format", "csv", "--theta-r", "95"], "--theta-r: 95° is not an angle from 0° to below 90°"),

@@ -220,11 +220,9 @@ def test_wavelengths_that_do_not_fit_are_refused(refused, paint, arguments, mess
     assert message in refused("render", paint, *(paint if a == "PAINT" else a for a in arguments))
 
 
-@pytest.mark.slow
-def test_a_fit_with_parameters_of_each_wavelength_paints_in_colour(tmp_path):
-    from pbrdf.cli.wavelengths import painted_with
-    from pbrdf.errors import PbrdfError
-
+@pytest.fixture(scope="module")
+def fit_of_colours(tmp_path_factory):
+    """Folder of a fit at 450, 550 and 650 nm, whose amplitude is free and whose index is held at each."""
     paint = pbrdf.load_paint("white")
     theta_r = np.tile(np.deg2rad(np.arange(0.0, 80.0, 8.0)), 3)
     nm = np.repeat([450.0, 550.0, 650.0], 10)
@@ -233,19 +231,61 @@ def test_a_fit_with_parameters_of_each_wavelength_paints_in_colour(tmp_path):
         0.6, theta_r, 0.0, quantity="brdf", I=stokes[:, 0], Q=stokes[:, 1], U=stokes[:, 2], wavelength=nm
     )
     held = {name: value for name, value in paint.values.items() if name != "a"}
-    held["n"] = {w: paint.values["n"] + (550.0 - w) / 1e6 for w in (450.0, 550.0, 650.0)}
-    pbrdf.fit(ds, fix=held, split={"a": "wavelength"}, starts=2).save(tmp_path / "f")
-    source = str(tmp_path / "f")
+    held["n"] = {w: paint.values["n"] + (550.0 - w) / 1e4 for w in (450.0, 550.0, 650.0)}
+    folder = tmp_path_factory.mktemp("fits") / "f"
+    pbrdf.fit(ds, fix=held, split={"a": "wavelength"}, starts=2).save(folder)
+    return folder
+
+
+@pytest.mark.slow
+def test_a_fit_with_parameters_of_each_wavelength_paints_in_colour(fit_of_colours):
+    from pbrdf.cli.wavelengths import painted_with
+    from pbrdf.errors import PbrdfError
+
+    paint = pbrdf.load_paint("white")
+    source = str(fit_of_colours)
     ((name, models),) = painted_with([source], [450.0, 550.0, 650.0])
     assert name == source
     np.testing.assert_allclose(
         [m.values["a"] / paint.values["a"] for m in models], [450 / 550, 1.0, 650 / 550], rtol=0.02
     )
-    assert [m.values["n"] for m in models] == list(held["n"].values())
+    np.testing.assert_allclose(
+        [m.values["n"] - paint.values["n"] for m in models], [0.01, 0.0, -0.01], atol=1e-9
+    )
     with pytest.raises(PbrdfError, match="has parameters at 450, 550, 650 nm"):
         painted_with([source], [470.0])
-    # without a wavelength it stands for one model as before
-    assert len(painted_with([source], [None])[0][1]) == 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("render", "FIT", "-o", "r"),
+        ("simulate", "FIT", "--theta-i", "30", "-o", "s.csv"),
+        ("export", "FIT", "-o", "e.pbsdf"),
+        ("export", "FIT", "-o", "e.binary"),
+        ("measure", "FIT", "-o", "m"),
+        ("plan", "FIT", "-o", "p"),
+        ("plot", "FIT", "--kind", "curves"),
+    ],
+)
+def test_no_command_takes_the_first_wavelength_of_a_fit_for_all(refused, fit_of_colours, arguments):
+    command, _, *rest = arguments
+    assert (
+        "this fit has a model of each of 3 wavelengths, 450, 550, 650 nm: choose one with --wavelength"
+        in (refused(command, str(fit_of_colours), *rest))
+    )
+
+
+@pytest.mark.slow
+def test_a_command_takes_the_wavelength_of_a_fit_that_is_asked_for(run, tmp_path, fit_of_colours):
+    where = ("--theta-i", "30", "--theta-r", "40", "--phi", "10")
+    run("simulate", str(fit_of_colours), "--wavelength", "650", *where, "--mueller", "-o", "s.csv")
+    run("export", str(fit_of_colours), "--wavelength", "650", "--wavelength", "450", *where, "-o", "e.csv")
+    alone, both = pbrdf.read(tmp_path / "s.csv"), pbrdf.read(tmp_path / "e.csv")
+    assert both.wavelength.values.tolist() == [650.0, 450.0]
+    f00 = both["mueller"].values[:, 0, 0]
+    assert f00[0] == alone["mueller"].values[0, 0, 0] > 1.2 * f00[1]
 
 
 def test_an_albedo_is_of_one_wavelength(refused):

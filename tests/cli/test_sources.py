@@ -8,7 +8,9 @@ import pytest
 from pbrdf.cli.sources import open_model
 from pbrdf.data import make_dataset, write
 from pbrdf.data.formats.tensor_file import write_tensors
+from pbrdf.data.paints import load_paint
 from pbrdf.errors import PbrdfError
+from pbrdf.inversion import fit
 from pbrdf.models import load_model
 
 
@@ -37,6 +39,22 @@ def test_nor_is_a_data_set(tmp_path, name):
     write(make_dataset(0.5, 0.5, 0.0, quantity="brdf", I=[0.2]), tmp_path / name)
     with pytest.raises(PbrdfError, match="tables are measurements, not models; fit them first"):
         open_model(str(tmp_path / name))
+
+
+@pytest.mark.slow
+def test_of_parameters_by_group_the_first_are_told_to_be_taken(tmp_path, capsys):
+    paint = load_paint("white")
+    theta_r = np.tile(np.deg2rad(np.arange(0.0, 80.0, 8.0)), 2)
+    group = np.repeat(["left", "right"], 10)
+    stokes = np.asarray(paint.stokes(0.6, theta_r, 0.0)) * np.where(group == "left", 1.0, 0.5)[:, None]
+    ds = make_dataset(
+        0.6, theta_r, 0.0, quantity="brdf", I=stokes[:, 0], Q=stokes[:, 1], U=stokes[:, 2], group=group
+    )
+    held = {name: value for name, value in paint.values.items() if name != "a"}
+    result = fit(ds, fix=held, split={"a": "group"}, starts=2)
+    result.save(tmp_path / "f")
+    assert open_model(str(tmp_path / "f")) == result.model
+    assert "a of its own in each group: this is the model of the first, left" in capsys.readouterr().err
 
 
 def test_a_file_that_is_no_text_is_answered_without_a_codec(table):

@@ -107,7 +107,13 @@ def test_one_wavelength_is_a_number(database):
 
 
 @pytest.mark.parametrize(
-    "name", ["lacquer/Table_of_n", "main/lacquer/Table of n", " main / lacquer / Table_of_n "]
+    "name",
+    [
+        "lacquer/Table_of_n",
+        "main/lacquer/Table of n",
+        " main / lacquer / Table_of_n ",
+        "https://refractiveindex.info/?shelf=main&book=lacquer&page=Table_of_n",
+    ],
 )
 def test_ways_of_writing_a_page(database, name):
     found = pbrdf.refractive_index(name, 550.0, database=database)

@@ -1,5 +1,7 @@
 """What is open: sources by what they are, names that are free, the state to begin with."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -22,6 +24,14 @@ def experiment():
 
 def test_nothing_is_the_empty_state(workspace):
     assert workspace.state() is None
+
+
+def test_the_model_of_a_fit_of_several_wavelengths_is_called_by_its_own(workspace, experiment, white):
+    alone = SimpleNamespace(model=white, models={}, dataset=experiment)
+    workspace.add_fit("one", alone)
+    workspace.add_fit("three", SimpleNamespace(**{**vars(alone), "models": {450.0: white, 550.0: white}}))
+    assert [name for name, _ in workspace.models] == ["one", "three at 450 nm"]
+    assert [name for name, _ in workspace.datasets] == ["one", "three"]
 
 
 def test_a_paint_and_a_model_file(workspace, white, tmp_path):

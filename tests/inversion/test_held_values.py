@@ -145,6 +145,12 @@ def test_it_is_stored_and_brought_back(result, tmp_path):
     result.save(tmp_path / "fit")
     back = pbrdf.load_fit(tmp_path / "fit")
     assert back.space.by_wavelength == result.space.by_wavelength
+    assert back.models == result.models
+    assert [m.values["n"] for m in back.models.values()] == [n for n, _ in DISPERSION.values()]
+    for nm, model in back.models.items():
+        assert model.values["a"] == back.estimates[f"a[{nm:g}]"].value
+    assert back.model == back.models[450.0]
+    assert f"{back.model!r} at 450 nm, the first of 3, χ²" in repr(back)
     record = json.loads((tmp_path / "fit" / "fit.json").read_text(encoding="utf-8"))
     assert record["held_by_wavelength"]["n"] == {"450": 1.60, "550": 1.52, "650": 1.45}
     assert "fixed at each wavelength" in (tmp_path / "fit" / "summary.txt").read_text(encoding="utf-8")

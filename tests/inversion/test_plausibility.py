@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import pbrdf
 from pbrdf.inversion.plausibility import Severity, plausibility
@@ -47,6 +48,20 @@ def test_a_plausible_fit_gets_no_objection(well_measured):
     assert f"reflects at most {largest:.3g} " in found["energy"][0].sentence
     assert "58 geometries: θ_i 20.0–50.0°, θ_r 0.0–70.0°, facet tilt 0.0–60.0°" in found["range"][0].sentence
     assert "everywhere out of the plane of incidence" in found["range"][0].sentence
+
+
+@pytest.mark.slow
+def test_energy_is_counted_at_the_wavelength_that_reflects_most():
+    """The model of the first wavelength takes in much, that of the last gives out more than it gets."""
+    parts = []
+    for nm, a in ((450.0, 0.2), (650.0, 1.8)):
+        part = measured(WELL.replace(a=a), [20.0, 50.0], np.arange(-70.0, 75.0, 10.0))
+        parts.append(part.assign_coords(wavelength=("geometry", np.full(part.sizes["geometry"], nm))))
+    dataset = xr.concat(parts, "geometry")
+    held = {name: value for name, value in WELL.values.items() if name != "a"}
+    result = pbrdf.fit(dataset, fix=held, split={"a": "wavelength"}, starts=2)
+    (energy,) = findings(result, dataset)["energy"]
+    assert energy.severity is Severity.VIOLATION and "°, 650 nm), more than it receives" in energy.sentence
 
 
 @pytest.mark.slow

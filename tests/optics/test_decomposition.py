@@ -298,7 +298,9 @@ def test_matrices_without_light_are_nan_among_others():
         assert_array_equal(np.isnan(index(matrices)).ravel(), [False, *[True] * 6, False])
 
 
-@pytest.mark.parametrize("function", [lu_chipman, pbrdf.depolarization_index, pbrdf.cloude_entropy])
+@pytest.mark.parametrize(
+    "function", [lu_chipman, pbrdf.depolarization_index, pbrdf.cloude_entropy, pbrdf.coherency_eigenvalues]
+)
 def test_other_shapes_are_refused(function):
     with pytest.raises(DataError, match=r"\(\.\.\., 4, 4\), these have \(3, 16\)"):
         function(np.ones((3, 16)))
@@ -306,6 +308,12 @@ def test_other_shapes_are_refused(function):
         function(xr.DataArray(np.eye(4), dims=("row", "column")))
     with pytest.raises(DataError, match="stokes_out and stokes_in of the length 4"):
         function(xr.DataArray(np.eye(3), dims=("stokes_out", "stokes_in")))
+    with pytest.raises(DataError, match=r'of a data set dataset\["mueller"\]'):
+        function(xr.DataArray(np.eye(4), dims=("stokes_out", "stokes_in")).to_dataset(name="mueller"))
+    with pytest.raises(DataError, match="real numbers, these are complex"):
+        function(np.eye(4, dtype=complex))
+    with pytest.raises(DataError, match="are numbers"):
+        function([[1, 2], [3]])
     assert lu_chipman(np.ones((0, 4, 4))).fast_axis.shape == (0, 3)
 
 
@@ -329,6 +337,35 @@ def test_xarray():
     for index in (pbrdf.depolarization_index, pbrdf.cloude_entropy):
         assert_array_equal(index(labelled).values, index(matrices))
     assert isinstance(lu_chipman(matrices[0]).retardance, float)
+
+
+def test_labels_say_which_element_is_which():
+    matrices = np.stack([retarder(0.3, d) @ diattenuator(0.2, 0.5) for d in (0.5, 1.0, 1.5)])
+    order = list("IQUV")
+    labelled = xr.DataArray(
+        matrices,
+        dims=("geometry", "stokes_out", "stokes_in"),
+        coords={"stokes_out": order, "stokes_in": order},
+    )
+    turned = labelled.sel(stokes_out=list("VUQI"), stokes_in=list("QVIU"))
+    found, plain = lu_chipman(turned), lu_chipman(matrices)
+    for name in FIELDS:
+        assert_array_equal(getattr(found, name).values, getattr(plain, name))
+    assert list(found.retarder["stokes_in"].values) == order
+    for index in (pbrdf.depolarization_index, pbrdf.cloude_entropy, pbrdf.coherency_eigenvalues):
+        assert_array_equal(index(turned), index(matrices))
+
+
+def test_what_is_masked_is_not_known():
+    matrices = np.ma.masked_array(np.stack([retarder(0.3, 1.0)] * 3))
+    matrices[1, 2, 3] = np.ma.masked
+    for values in (
+        lu_chipman(matrices).retardance,
+        pbrdf.depolarization_index(matrices),
+        pbrdf.cloude_entropy(matrices),
+        pbrdf.coherency_eigenvalues(matrices)[:, 0],
+    ):
+        assert_array_equal(np.isnan(values), [False, True, False])
 
 
 def test_depolarisation_index_and_entropy():

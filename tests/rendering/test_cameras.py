@@ -155,6 +155,24 @@ BATCH = """<scene version="3.0.0">
 
 
 @pytest.mark.slow
+def test_instances_of_a_group_are_seen_by_every_camera_of_a_batch(mitsuba):
+    views = [camera(mitsuba, origin, film=film(12, 12)) for origin in ((0.0, -3.0, 1.0), (2.0, -2.0, 1.5))]
+    rest = {
+        "group": {"type": "shapegroup", "ball": {"type": "sphere", "radius": 0.4, "bsdf": COAT}},
+        "instance": {"type": "instance", "of": {"type": "ref", "id": "group"}},
+        "lamp": {"type": "point", "position": [1.5, -3.0, 2.0]},
+    }
+    batch = {"type": "batch", "one": views[0], "two": views[1], "film": film(24, 12)}
+    both = render_stokes(mitsuba.load_dict({"type": "scene", "eyes": batch, **rest}), spp=64, depth=2).stokes
+    for i, view in enumerate(views):
+        alone = render_stokes(
+            mitsuba.load_dict({"type": "scene", "eye": view, **rest}), spp=64, depth=2
+        ).stokes
+        seen = both[:, :, 12 * i : 12 * (i + 1)]
+        np.testing.assert_allclose(seen.sum(axis=(1, 2)), alone.sum(axis=(1, 2)), atol=0.02 * alone[0].sum())
+
+
+@pytest.mark.slow
 def test_a_scene_file_with_a_batch(mitsuba, tmp_path):
     file = tmp_path / "batch.xml"
     file.write_text(BATCH)

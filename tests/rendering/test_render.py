@@ -163,6 +163,35 @@ def test_sheets_that_light_passes_straight_are_told_from_others(mitsuba, bsdf, s
 
 
 @pytest.mark.slow
+def test_a_lamp_behind_a_polariser_of_a_group_lights_as_behind_one_of_its_own(mitsuba):
+    """Shapes of a group are not among those of the scene; a polariser takes half of natural light."""
+    place = mitsuba.ScalarTransform4f
+    floor = {"type": "rectangle", "bsdf": {"type": "diffuse"}}
+    sheet = {
+        "type": "rectangle",
+        "to_world": place().translate([0.0, 2.0, 2.0]).scale(5.0),
+        "bsdf": {"type": "polarizer"},
+    }
+    group = {"type": "shapegroup", "sheet": sheet}
+    instance = {"type": "instance", "of": {"type": "ref", "id": "group"}}
+    lamp = {"type": "point", "position": [0.0, 2.0, 3.0]}
+    camera = {
+        "type": "perspective",
+        "fov": 10.0,
+        "to_world": place().look_at([0.0, -1.0, 1.0], [0.0, 0.0, 0.0], [0.0, 0.0, 1.0]),
+        "film": {"type": "hdrfilm", "width": 6, "height": 6, "pixel_format": "luminance"},
+    }
+
+    def seen(**more):
+        scene = mitsuba.load_dict({"type": "scene", "floor": floor, "lamp": lamp, "camera": camera, **more})
+        return render_stokes(scene, spp=64, depth=2).stokes[0].mean()
+
+    behind_one = seen(sheet=sheet)
+    assert behind_one == pytest.approx(0.5 * seen(), rel=1e-3)
+    assert seen(group=group, instance=instance) == pytest.approx(behind_one, rel=1e-3)
+
+
+@pytest.mark.slow
 def test_standard_errors_are_those_of_independent_pictures(mitsuba):
     """Pictures with other seeds scatter by the stated standard errors, in every component."""
     what = subject("sphere", [COAT])

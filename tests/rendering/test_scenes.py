@@ -192,6 +192,11 @@ def test_a_scene_file_may_ask_for_several_models(mitsuba, tmp_path):
         (lambda s: s[: s.index("<sensor")] + s[s.index("</sensor>") + 9 :], 1, "no camera"),
         (lambda s: s.replace("</scene>", ""), 1, "Mitsuba cannot read this scene"),
         (lambda s: s.replace('type="point"', 'type="lantern"'), 1, "Mitsuba cannot read this scene"),
+        (
+            lambda s: s.replace('type="point"', 'type="pbrdf_polarized"'),
+            1,
+            "Mitsuba cannot read this scene: pbrdf_polarized: ",
+        ),
     ],
 )
 def test_scene_files_that_cannot_be_used_are_refused(mitsuba, tmp_path, change, coats, message):

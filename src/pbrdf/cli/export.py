@@ -12,7 +12,7 @@ import typer
 from pbrdf.cli.console import progress_bar, warn
 from pbrdf.cli.directions import GRID, directions_of
 from pbrdf.cli.options import Backend, NoProgressBar, angles_option, model_argument, output_option
-from pbrdf.cli.sources import known_wavelength, open_single_model
+from pbrdf.cli.sources import known_wavelength, models_at, open_single_model
 from pbrdf.cli.values import require_folder_of
 from pbrdf.errors import PbrdfError
 
@@ -55,7 +55,11 @@ def export(
     ] = None,
     wavelength: Annotated[
         list[float] | None,
-        typer.Option(help="Wavelength of each MODEL in nm, in their order (repeatable).", metavar="NM"),
+        typer.Option(
+            help="Wavelength of each MODEL in nm, in their order, or those of a fit with a model of each "
+            "(repeatable).",
+            metavar="NM",
+        ),
     ] = None,
     theta_i: Annotated[
         str | None,
@@ -88,14 +92,10 @@ def export(
     for name, given in (("--theta-i", theta_i), ("--theta-r", theta_r), ("--phi", phi)):
         if given is not None and not on_a_grid:
             raise PbrdfError(f"{name}: a {kind.value} file has its own directions; leave it out")
-    if kind is Format.merl and wavelength:
-        raise PbrdfError(
-            "--wavelength: a merl file states no wavelength, only red, green and blue; leave it out"
-        )
     require_folder_of(target)
     if backend is not None:
         set_backend(backend)
-    models = [open_single_model(source) for source in sources]
+    models = _models(sources, wavelength or [], kind)
     if kind is Format.merl:
         with progress_bar("Tabulating", quiet) as progress:
             planes = write_merl(models, target, progress=progress)
@@ -127,6 +127,19 @@ def _target(source: str, format: Format | None, output: Path | None) -> tuple[Fo
     if format not in (None, of_extension):
         raise PbrdfError(f"--output {output}: a {format.value} file is called {_EXTENSIONS[format]}")
     return of_extension, output
+
+
+def _models(sources: list[str], wavelengths: list[float], kind: Format) -> list[Model]:
+    """The model of each source, or those of the one fit at each wavelength."""
+    if len(sources) == 1 and wavelengths and (fitted := models_at(sources[0], wavelengths)) is not None:
+        return fitted
+    if kind is Format.merl and wavelengths:
+        raise PbrdfError(
+            "--wavelength: a merl file states no wavelength, only red, green and blue; leave it out"
+        )
+    # of another number of wavelengths the writer tells
+    chosen = wavelengths if len(wavelengths) == len(sources) else [None] * len(sources)
+    return [open_single_model(source, nm) for source, nm in zip(sources, chosen, strict=True)]
 
 
 def _wavelengths(sources: list[str], models: list[Model], stated: list[float]) -> list[float] | None:

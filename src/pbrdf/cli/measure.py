@@ -140,7 +140,7 @@ def measure(
         name = Path(source).stem
         if name in samples:
             raise PbrdfError(f"two samples are called {name!r}: give each a name of its own")
-        samples[name] = open_model(source)
+        samples[name] = open_model(source, wavelength)
     protocol = _protocol(positions, sample_angles, angle_table, taken.reference_angle)
     if wavelength is None and len(known := {known_wavelength(source) for source in sources}) == 1:
         (wavelength,) = known

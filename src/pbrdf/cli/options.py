@@ -65,7 +65,9 @@ NoProgressBar = Annotated[bool, typer.Option("--quiet", "-q", help="No progress 
 WrittenWavelength = Annotated[
     float | None,
     typer.Option(
-        help="Wavelength to write down.", metavar="NM", show_default="476 of bundled paints, else none"
+        help="Wavelength to write down, and whose model a fit with one of each stands for.",
+        metavar="NM",
+        show_default="476 of bundled paints, else none",
     ),
 ]
 

@@ -64,6 +64,10 @@ def plan(
             help="Standard error of the sample angle (out of plane of its tilt too), degrees.", min=0.0
         ),
     ] = 0.0,
+    wavelength: Annotated[
+        float | None,
+        typer.Option(help="Of a fit with a model of each wavelength the one to plan for.", metavar="NM"),
+    ] = None,
     normalised: Annotated[
         bool,
         typer.Option(
@@ -136,7 +140,7 @@ def plan(
         require_folder_of(file)
     if backend is not None:
         set_backend(backend)
-    model = open_model(source)
+    model = open_model(source, wavelength)
     taken = open_instrument(instrument or "paper") if noise is None else noise
     choose = candidates.out_of_plane_candidates if out_of_plane else candidates.in_plane_candidates
     with progress_bar("Planning") as progress:

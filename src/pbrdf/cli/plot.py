@@ -152,10 +152,16 @@ def _opened(source: str, reading: Reading) -> Source:
 
         return Source(_name(source), model=open_single_model(source))
     if _is_fit(source):
+        from pbrdf.cli.sources import models_at
         from pbrdf.inversion.stored_result import load_fit
 
         result = load_fit(source)
-        return Source(_name(source), model=result.model, dataset=result.dataset)
+        models = models_at(source, reading.wavelength or [None])
+        if models is None:
+            return Source(_name(source), model=result.model, dataset=result.dataset)
+        if len(models) > 1:
+            raise PbrdfError(f"--wavelength: of {source} one is drawn, for {len(models)} were asked")
+        return Source(_name(source), model=models[0], dataset=reading.selected(result.dataset, source))
     return Source(_name(source), dataset=reading.open(source))
 
 

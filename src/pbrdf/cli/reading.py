@@ -120,18 +120,20 @@ class Reading:
             raise DataError(f"{source}: there is no such file{'' if Path(source).suffix else names}")
         if self.scale is not None:
             dataset.attrs["scale"] = self.scale
-        for wanted in self._selections():
-            dataset = _selected(dataset, *wanted, source)
+        dataset = self.selected(dataset, source)
         origin = origin_of(dataset)
         for sentence in origin.remarks if say and origin else ():
             warn(f"{source}: {on_the_command_line(sentence)}")
         return dataset
 
-    def _selections(self) -> list[tuple[str, str]]:
+    def selected(self, dataset: xr.Dataset, source: str) -> xr.Dataset:
+        """The geometries that are asked for; raises DataError where there are none."""
         selections = list(pairs(self.select, "--select", "theta_i=0:80").items())
         if self.wavelength:
             selections.append(("wavelength", ",".join(f"{w:g}" for w in self.wavelength)))
-        return selections
+        for kind, text in selections:
+            dataset = _selected(dataset, kind, text, source)
+        return dataset
 
 
 def print_columns(dataset: xr.Dataset, source: str) -> None:

@@ -128,7 +128,7 @@ def simulate(
     stated = None if noise is None else parse_noise(f"{noise},0" if _PLAIN_NUMBER.fullmatch(noise) else noise)
     if backend is not None:
         set_backend(backend)
-    model = open_single_model(source)
+    model = open_single_model(source, wavelength)
 
     directions = directions_of(theta_i, theta_r, phi, plane, bistatic)
     columns, std = _evaluate(model, directions, light, (mueller, normalised), stated, seed)

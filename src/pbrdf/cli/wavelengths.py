@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pbrdf.cli.reading import Reading
@@ -18,8 +17,6 @@ __all__ = ["MANY", "painted_with", "require_choice"]
 
 #: What becomes of the data if nothing is chosen, in words.
 _FITTED = "one set of parameters for all would be fitted"
-#: Wavelengths that differ by no more are the same, nm.
-_SAME = 0.5
 #: From so many wavelengths on, one set of parameters for all is hardly meant: it has to be said.
 MANY = 6
 
@@ -87,14 +84,14 @@ def painted_with(
     Raises
     ------
     PbrdfError
-        If models do not go into the wavelengths, or a fit knows one of them not.
+        If models do not go into the wavelengths, a fit knows one of them not, or one is to be chosen of a fit.
     """
-    from pbrdf.cli.sources import open_model
+    from pbrdf.cli.sources import models_at, open_model
 
     painted: list[tuple[str, list[Model]]] = []
     waiting: list[str] = []
     for source in sources:
-        models = None if wavelengths[0] is None else _fitted_at(source, wavelengths)
+        models = models_at(source, wavelengths)
         if models is not None and not waiting:
             painted.append((source, models))
             continue
@@ -108,27 +105,3 @@ def painted_with(
             f"not followed by as many; or give the folder of a fit with --split NAME=wavelength"
         )
     return painted
-
-
-def _fitted_at(source: str, wavelengths: Sequence[float | None]) -> list[Model] | None:
-    """The models of a fit with parameters free or held for each wavelength; None if the source is no such fit."""
-    from pbrdf.inversion.stored_result import FILE_NAME
-
-    folder = Path(source)
-    if not (folder / FILE_NAME).is_file():
-        return None
-    from pbrdf.inversion.stored_result import load_fit
-
-    result = load_fit(folder)
-    known = result.space.wavelengths
-    if not known:
-        return None
-    values = [result.estimates[name].value for name in result.space.names]
-    models = []
-    for wanted in wavelengths:
-        label = min(known, key=lambda one: abs(float(one) - float(wanted or 0.0)))
-        if abs(float(label) - float(wanted or 0.0)) > _SAME:
-            shown = ", ".join(f"{float(one):g}" for one in known)
-            raise PbrdfError(f"--wavelength {wanted:g}: {source} has parameters at {shown} nm")
-        models.append(result.space.build(values, label=label))
-    return models

@@ -12,6 +12,7 @@ import difflib
 import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from urllib.parse import parse_qs, urlsplit
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -42,7 +43,7 @@ def refractive_index(
     Parameters
     ----------
     page
-        SHELF/BOOK/PAGE as in the page's address, for example ``"main/SiO2/Malitson"``, or BOOK/PAGE.
+        SHELF/BOOK/PAGE as in the page's address, for example ``"main/SiO2/Malitson"``, or BOOK/PAGE, or that address.
     wavelength
         In nm, one or several, shape () or (N,).
     database
@@ -74,6 +75,7 @@ def refractive_index(
     wanted = np.asarray(wavelength, dtype=float)
     if wanted.ndim > 1 or not (np.isfinite(wanted) & (wanted > 0.0)).all():
         raise DataError(f"{page}: wavelengths are finite numbers of nm above 0, one or a list of them")
+    page = _of_address(page)
     package = _package(page)
     match = _found(package, page, database)
     name = _name(match)
@@ -177,6 +179,12 @@ def _similar(package: Any, pages: list[Any], page: str, folder: Path | None) -> 
             listed += [_name(one) for one in package.search(words, db_path=folder)]
     listed = list(dict.fromkeys(listed))[:_MOST]
     return f"; similar are {', '.join(listed)}" if listed else ""
+
+
+def _of_address(page: str) -> str:
+    """SHELF/BOOK/PAGE of an address with these; what is none as it is."""
+    query = parse_qs(urlsplit(page).query)
+    return "/".join(query[key][0] for key in ("shelf", "book", "page") if key in query) or page
 
 
 def _name(match: Any) -> str:

@@ -115,8 +115,9 @@ class Workspace:
         return free
 
     def add_fit(self, name: str, result: FitResult) -> None:
-        """Open a fit: its model and its data, too."""
-        self.add_model(name, result.model)
+        """Open a fit: its model, of several wavelengths that of the first, and its data, too."""
+        first = next(iter(result.models), None)
+        self.add_model(name if first is None else f"{name} at {first:g} nm", result.model)
         self.add_dataset(name, result.dataset)
         self.fits.append((_free(name, self.fits), result))
 

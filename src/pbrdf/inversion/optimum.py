@@ -29,7 +29,7 @@ class Optimum:
     Attributes
     ----------
     model
-        The model at the best optimum.
+        The model at the best optimum; where parameters differ between wavelengths or groups that of the first.
     estimates
         Every parameter by name.
     goodness
@@ -54,6 +54,12 @@ class Optimum:
     unknowns: np.ndarray = field(repr=False)
     information: np.ndarray = field(repr=False)
     settled: bool = True
+
+    @property
+    def models(self) -> dict[float, Model]:
+        """The model of each wavelength in nm where parameters are free or held for each; empty where all share one."""
+        values = [self.estimates[name].value for name in self.space.names]
+        return {float(label): self.space.build(values, label) for label in self.space.wavelengths}
 
     @property
     def std_known(self) -> bool:

@@ -84,18 +84,27 @@ def plausibility(result: Optimum, dataset: xr.Dataset | None = None) -> list[Fin
     attributes = {**result.comparison.attrs, **(dataset.attrs if dataset is not None else {})}
     return [
         _energy(result, attributes),
-        _realisability(result.model),
+        _realisability(_models(result)),
         *_parameters(result, verdict(result).level),
         _lobe(result),
         *_range(result),
     ]
 
 
+def _models(result: Optimum) -> dict[str, Model]:
+    """Every model of the fit, by words that name its wavelength after a direction."""
+    return {f", {nm:g} nm": model for nm, model in result.models.items()} or {"": result.model}
+
+
 def _energy(result: Optimum, attributes: dict[Any, Any]) -> Finding:
     incidence = np.deg2rad(INCIDENCES)
-    reflectance = directional_hemispherical_reflectance(result.model, incidence)
+    reflectances = {
+        at: directional_hemispherical_reflectance(model, incidence) for at, model in _models(result).items()
+    }
+    at, reflectance = max(reflectances.items(), key=lambda item: float(item[1].max()))
     worst = int(np.argmax(reflectance))
-    largest = f"The model reflects at most {reflectance[worst]:.3g} of natural light (at θ_i = {INCIDENCES[worst]}°)"
+    where = f"at θ_i = {INCIDENCES[worst]}°{at}"
+    largest = f"The model reflects at most {reflectance[worst]:.3g} of natural light ({where})"
     gain = any(term.nuisance and term.role == "gain" for term in result.space.terms)
     unknown = _unknown_scale(attributes)
     if not {"I", "m00"} & set(result.data.channels):
@@ -103,7 +112,7 @@ def _energy(result: Optimum, attributes: dict[Any, Any]) -> Finding:
     if unknown and not gain:
         sentence = f"{largest}, which says nothing about energy: {unknown}."
         return Finding("energy", Severity.NOTE, sentence)
-    above = reflectance > 1.0 + ENERGY_TOLERANCE
+    above = np.max(list(reflectances.values()), axis=0) > 1.0 + ENERGY_TOLERANCE
     if gain:
         # the lobe has no free factor of its own: its height against Fresnel's reflectance is what fixes a gain
         sentence = f"{largest}; that rests on the fitted gain, which only the height of the lobe determines."
@@ -134,14 +143,14 @@ def _unknown_scale(attributes: dict[Any, Any]) -> str:
     return ""
 
 
-def _realisability(model: Model) -> Finding:
-    least, where = least_coherency(model)
+def _realisability(models: dict[str, Model]) -> Finding:
+    (least, where), at = min((least_coherency(model), at) for at, model in models.items())
     if least >= -COHERENCY_TOLERANCE:
         sentence = "Every Mueller matrix on a grid over the hemisphere is that of a passive surface."
         return Finding("realisability", Severity.OK, sentence)
     i, r, phi = np.rad2deg(where)
     sentence = (
-        f"The Mueller matrix at θ_i = {i:.0f}°, θ_r = {r:.0f}°, φ = {phi:.0f}° is that of no passive surface: its "
+        f"The Mueller matrix at θ_i = {i:.0f}°, θ_r = {r:.0f}°, φ = {phi:.0f}°{at} is that of no passive surface: its "
         f"coherency matrix has the eigenvalue {least:.2g}·f00."
     )
     return Finding("realisability", Severity.VIOLATION, sentence)

@@ -85,7 +85,11 @@ class FitResult(Optimum):
     seconds: float = math.nan
 
     def __repr__(self) -> str:
-        return f"<FitResult: {self.model!r}, χ² {self.goodness.chi2:.4g} over {self.goodness.data} values>"
+        first = self.space.wavelengths[:1]
+        at = f" at {first[0]:g} nm, the first of {len(self.space.wavelengths)}" if first else ""
+        return (
+            f"<FitResult: {self.model!r}{at}, χ² {self.goodness.chi2:.4g} over {self.goodness.data} values>"
+        )
 
     def __str__(self) -> str:
         return self.summary().rstrip()

@@ -12,7 +12,6 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from pbrdf.errors import DataError
 
@@ -31,21 +30,28 @@ _BEYOND = 1e30
 _BASIS = 0.25 * np.einsum("iab,jcd->ijacbd", _PAULI, _PAULI.conj()).reshape(4, 4, 4, 4)
 
 
-def coherency_eigenvalues(mueller: ArrayLike) -> np.ndarray:
+def coherency_eigenvalues(mueller: Any) -> np.ndarray:
     """Eigenvalues of Cloude's coherency matrix, ascending.
 
     Parameters
     ----------
     mueller
-        Mueller matrices, shape (..., 4, 4).
+        As for :func:`depolarization_index`.
 
     Returns
     -------
     ndarray
-        Shape (..., 4), in the unit of M00; their sum is M00.
+        Shape (..., 4), in the unit of M00; their sum is M00. NaN where an element is not finite.
+
+    Raises
+    ------
+    DataError
+        If these are not 4 × 4 matrices.
     """
-    H = np.einsum("...ij,ijab->...ab", np.asarray(mueller, dtype=float), _BASIS)
-    return np.linalg.eigvalsh(H)
+    matrices, _ = matrices_of(mueller)
+    known = np.isfinite(matrices).all(axis=(-2, -1))[..., None]
+    H = np.einsum("...ij,ijab->...ab", np.where(known[..., None], matrices, 0.0), _BASIS)
+    return np.where(known, np.linalg.eigvalsh(H), np.nan)
 
 
 def depolarization_index(mueller: Any) -> Any:
@@ -55,7 +61,7 @@ def depolarization_index(mueller: Any) -> Any:
     ----------
     mueller
         Mueller matrices, shape (..., 4, 4), normalised or not; or an xarray array with the dimensions ``stokes_out``
-        and ``stokes_in``.
+        and ``stokes_in``, in any order of the dimensions and of the labels I, Q, U, V. What is masked counts as NaN.
 
     Returns
     -------
@@ -115,18 +121,26 @@ def matrices_of(mueller: Any) -> tuple[np.ndarray, Callable[..., Any]]:
     """
     dims = getattr(mueller, "dims", None)
     if dims is None:
-        matrices = np.asarray(mueller, dtype=float)
+        matrices = _numbers(mueller)
         if matrices.shape[-2:] != (4, 4):
             raise DataError(f"Mueller matrices have the shape (..., 4, 4), these have {matrices.shape}")
         return matrices, lambda values, *_: values[()]
     import xarray as xr
 
     own = ("stokes_out", "stokes_in")
+    if not isinstance(mueller, xr.DataArray):
+        raise DataError('Mueller matrices are one array, of a data set dataset["mueller"]')
     if not {*own} <= {*dims} or mueller.sizes["stokes_out"] != 4 or mueller.sizes["stokes_in"] != 4:
         raise DataError(
             f"Mueller matrices have the dimensions {' and '.join(own)} of the length 4, these have "
             f"{dict(mueller.sizes)}"
         )
+    labels = list("IQUV")
+    for dim in own:
+        given = mueller[dim].values.tolist() if dim in mueller.coords else labels
+        # other labels, numbers for instance, are taken in their order
+        if given != labels and sorted(map(str, given)) == labels:
+            mueller = mueller.sel({dim: labels})
     labelled = mueller.transpose(..., *own)
     leading = labelled.isel(dict.fromkeys(own, 0), drop=True)
 
@@ -136,7 +150,19 @@ def matrices_of(mueller: Any) -> tuple[np.ndarray, Callable[..., Any]]:
             coords = {**coords, "stokes": list("QUV")}
         return xr.DataArray(values, dims=(*leading.dims, *following), coords=coords)
 
-    return np.asarray(labelled.values, dtype=float), made
+    return _numbers(labelled.values), made
+
+
+def _numbers(values: Any) -> np.ndarray:
+    """Real numbers, NaN where they are masked; raises DataError where there are others."""
+    try:
+        # a masked array would lose its mask as a plain one
+        found = values if isinstance(values, np.ndarray) else np.asarray(values)
+        if not np.iscomplexobj(found):
+            return np.ma.filled(found.astype(float, copy=False), np.nan)
+    except (TypeError, ValueError) as error:
+        raise DataError(f"Mueller matrices are numbers, shape (..., 4, 4): {error}") from error
+    raise DataError("Mueller matrices are real numbers, these are complex")
 
 
 def normalized(matrices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from pbrdf.errors import PbrdfError
 
-__all__ = ["camera_scenes", "picture_size"]
+__all__ = ["camera_scenes", "groups_of_shapes", "parts_of", "picture_size"]
 
 
 def picture_size(scene: Any) -> tuple[int, int]:
@@ -40,7 +40,7 @@ def camera_scenes(scene: Any) -> list[Any]:
     if not scene.sensors():
         raise PbrdfError("the scene has no camera (<sensor>)")
     sensor = scene.sensors()[0]
-    cameras = _members(sensor)
+    cameras = parts_of(sensor, mi.Sensor)
     if not cameras:
         _require_camera(sensor)
         return [scene]
@@ -50,8 +50,9 @@ def camera_scenes(scene: Any) -> list[Any]:
             "a batch of cameras shows its whole picture or none of it: leave the film's crop out"
         )
     shapes = {f"shape{i}": shape for i, shape in enumerate(scene.shapes())}
+    groups = {f"group{i}": group for i, group in enumerate(groups_of_shapes(scene))}
     lights = {f"light{i}": lamp for i, lamp in enumerate(scene.emitters()) if lamp.get_shape() is None}
-    names = {shape: shape.id() for shape in shapes.values()}
+    names = {shape: shape.id() for shape in (*groups.values(), *shapes.values())}
     scenes = []
     for camera in cameras:
         _require_camera(camera)
@@ -66,29 +67,36 @@ def camera_scenes(scene: Any) -> list[Any]:
                 "rfilter": film.rfilter(),
             }
         )
-        scenes.append(mi.load_dict({"type": "scene", "camera": camera, **shapes, **lights}))
+        scenes.append(mi.load_dict({"type": "scene", "camera": camera, **groups, **shapes, **lights}))
         # which have been renamed by the keys above
         for shape, name in names.items():
             shape.set_id(name)
     return scenes
 
 
-def _members(sensor: Any) -> list[Any]:
-    """The sensors that a ``batch`` consists of; none of any other sensor."""
+def groups_of_shapes(scene: Any) -> list[Any]:
+    """The ``shapegroup``\\ s of a scene, whose instances alone are among its shapes."""
     import mitsuba as mi
 
-    class Members(mi.TraversalCallback):
+    return [shape for shape in parts_of(scene, mi.Shape) if "ShapeGroup" in shape.class_name()]
+
+
+def parts_of(thing: Any, wanted: Any) -> list[Any]:
+    """The objects of a kind that a scene, a ``batch`` of sensors or a group of shapes consists of."""
+    import mitsuba as mi
+
+    class Parts(mi.TraversalCallback):
         def __init__(self) -> None:
             super().__init__()
             self.found: list[Any] = []
 
         def put(self, name: str, thing: Any, flags: int, kind: Any = None) -> None:
-            if isinstance(thing, mi.Sensor):
+            if isinstance(thing, wanted):
                 self.found.append(thing)
 
-    members = Members()
-    sensor.traverse(members)
-    return members.found
+    parts = Parts()
+    thing.traverse(parts)
+    return parts.found
 
 
 def _require_camera(sensor: Any) -> None:

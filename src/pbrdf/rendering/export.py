@@ -284,7 +284,7 @@ def _matching(models: list[Model], wavelengths: float | Sequence[float] | None) 
     stated = [] if wavelengths is None else [float(w) for w in np.atleast_1d(wavelengths)]
     if len(stated) != len(models):
         raise ModelError(
-            f"there are {len(models)} models and {len(stated)} wavelengths: state one wavelength for each model"
+            f"state one wavelength for each model: models are given {len(models)}, wavelengths {len(stated)}"
         )
     return stated
 

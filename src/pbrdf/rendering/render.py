@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from pbrdf.errors import PbrdfError
-from pbrdf.rendering.cameras import camera_scenes, picture_size
+from pbrdf.rendering.cameras import camera_scenes, groups_of_shapes, parts_of, picture_size
 from pbrdf.rendering.picture import StokesPicture
 
 __all__ = ["central_rays", "render_stokes"]
@@ -116,9 +116,10 @@ def _has_sheets(scene: Any) -> bool:
     """Whether light passes a surface of the scene straight: a polariser, a retarder, a mask, a thin pane."""
     import mitsuba as mi
 
+    in_groups = [shape for group in groups_of_shapes(scene) for shape in parts_of(group, mi.Shape)]
     return any(
         shape.bsdf() is not None and mi.has_flag(shape.bsdf().flags(), mi.BSDFFlags.Null)
-        for shape in scene.shapes()
+        for shape in (*scene.shapes(), *in_groups)
     )
 
 

@@ -319,7 +319,9 @@ def load_scene_file(path: Path, bsdfs: Sequence[Any], size: tuple[int, int] | No
     except PbrdfError:
         raise
     except RuntimeError as error:
-        raise PbrdfError(f"{path}: Mitsuba cannot read this scene: {_one_line(error)}") from error
+        # of a plug-in of ours it shows a traceback, whose end is what we said
+        ours = _one_line(error).rpartition("PbrdfError: ")[2]
+        raise PbrdfError(f"{path}: Mitsuba cannot read this scene: {ours}") from error
     finally:
         mi.set_file_resolver(before)
     return scene[0] if isinstance(scene, list) else scene
