@@ -107,7 +107,7 @@ def test_a_map_is_told_from_data(workspace, experiment, tmp_path, name, monkeypa
     else:
         # how stores are made is not of interest here
         (tmp_path / name).mkdir()
-        monkeypatch.setattr("pbrdf.inversion.map_store.map_store.stored_attributes", lambda path: {})
+        monkeypatch.setattr("pbrdf.inversion.map_store.is_map", lambda path: path.name == name)
         monkeypatch.setattr("pbrdf.inversion.map_store.open_map", lambda path, partial: found)
     open_source(workspace, str(tmp_path / name))
     ((opened, stored),) = workspace.maps

@@ -17,6 +17,7 @@ import numpy as np
 
 from pbrdf.data.schema import written
 from pbrdf.inversion.optimum import Optimum
+from pbrdf.inversion.statistics import dark_below
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -52,7 +53,7 @@ class PointError:
     intensity
         Measured intensity, 1/sr.
     intensity_error, relative_error
-        Model − measured in 1/sr, and in units of the measured value.
+        Model − measured in 1/sr, and relative to the measured value, but to no less than 5 % of the data's median.
     dolp, dolp_error
         Measured DoLP and model − measured, 1; NaN where no polarisation was measured.
     """
@@ -151,8 +152,8 @@ class GroupErrors:
     held_out
         Whether none of its points was fitted: the errors are those of a prediction.
     intensity, relative, dolp
-        Errors of the intensity in 1/sr, of the intensity in units of the measured one (points measured above 0),
-        and of the DoLP.
+        Errors of the intensity in 1/sr, of the intensity relative to the measured one, but to no less than 5 % of the
+        data's median, and of the DoLP.
     strongest_specular, strongest_diffuse
         The brightest measured points near the mirror direction and away from it; None where there is none.
     relative_right_of_peak, dolp_right_of_peak
@@ -234,8 +235,7 @@ def error_analysis(result: Optimum) -> ErrorAnalysis:
         return table[name].values if name in table else nan
 
     measured, intensity_error = column("I_measured"), column("I_residual")
-    with np.errstate(divide="ignore", invalid="ignore"):
-        relative_error = np.where(measured > 0.0, intensity_error / measured, np.nan)
+    relative_error = intensity_error / np.maximum(measured, dark_below(measured))
     theta_i, theta_r, phi = (table[name].values for name in ("theta_i", "theta_r", "phi"))
     # tilt of the mirror facet along the plane of incidence, positive where the viewer is farther out
     offset = np.arctan2(np.sin(theta_r) * np.cos(phi) - np.sin(theta_i), np.cos(theta_i) + np.cos(theta_r))

@@ -19,8 +19,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pbrdf.data.schema import is_ratio
-from pbrdf.inversion.holdout import DARK
-from pbrdf.inversion.statistics import typical
+from pbrdf.inversion.statistics import dark_below
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -73,10 +72,7 @@ class PointErrors:
             return comparison[name].values[where] if name in comparison else np.full(size, np.nan)
 
         measured, modelled = column("I_measured"), column("I_modelled")
-        floor = 0.0
-        if "I_measured" in comparison:
-            floor = DARK * typical(comparison["I_measured"].values)
-        floor = max(floor, float(np.finfo(float).tiny))
+        floor = dark_below(comparison["I_measured"].values if "I_measured" in comparison else np.empty(0))
         with np.errstate(divide="ignore", invalid="ignore"):
             intensity = _penalised((modelled - measured) / np.maximum(measured, floor), measured)
             polarised = []

@@ -10,15 +10,13 @@ import numpy as np
 
 from pbrdf.errors import FitError
 from pbrdf.files.plain_numbers import number_from_text
-from pbrdf.inversion.statistics import typical
+from pbrdf.inversion.statistics import dark_below
 
 if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["HoldOut", "Prediction", "prediction_errors"]
 
-#: Intensities below this share of the median do not make relative errors larger.
-DARK = 0.05
 _KINDS = ("group", "theta_i", "theta_r", "wavelength", "fraction")
 
 
@@ -154,8 +152,7 @@ def prediction_errors(comparison: xr.Dataset, where: np.ndarray) -> Prediction:
         measured = comparison[f"{channel}_measured"].values[where]
         error = comparison[f"{channel}_modelled"].values[where] - measured
         if relative:
-            dark = DARK * typical(comparison[f"{channel}_measured"].values)
-            error = error / np.maximum(measured, max(dark, np.finfo(float).tiny))
+            error = error / np.maximum(measured, dark_below(comparison[f"{channel}_measured"].values))
         values: np.ndarray = error[np.isfinite(error)]
         return values
 

@@ -8,7 +8,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-__all__ = ["Goodness", "covariance", "goodness", "middle", "prior_spread", "typical", "typical_of_each"]
+__all__ = [
+    "Goodness",
+    "covariance",
+    "dark_below",
+    "goodness",
+    "middle",
+    "prior_spread",
+    "typical",
+    "typical_of_each",
+]
+
+#: Share of the typical intensity that :func:`dark_below` is.
+DARK = 0.05
 
 
 @dataclass(frozen=True)
@@ -105,6 +117,11 @@ def typical(values: np.ndarray) -> float:
     if not np.isfinite(values).any():
         return 0.0
     return float(typical_of_each(np.abs(values).ravel())[0])
+
+
+def dark_below(measured: np.ndarray) -> float:
+    """Intensity, above 0, below which relative errors do not grow: 5 % of the typical one, what is darker is noise."""
+    return max(DARK * typical(measured), float(np.finfo(float).tiny))
 
 
 def typical_of_each(size: np.ndarray) -> np.ndarray:

@@ -19,9 +19,8 @@ import numpy as np
 from pbrdf.data.schema import is_ratio
 from pbrdf.inversion.erroranalysis import SIGNIFICANCE, sign_test
 from pbrdf.inversion.estimates import Estimate
-from pbrdf.inversion.holdout import DARK
 from pbrdf.inversion.optimum import Optimum
-from pbrdf.inversion.statistics import typical
+from pbrdf.inversion.statistics import dark_below
 from pbrdf.wording import joined
 
 __all__ = ["Level", "Stratum", "Verdict", "percent", "quotable", "verdict"]
@@ -338,8 +337,7 @@ def _intensity_errors(result: Optimum) -> np.ndarray:
     measured = table["I_measured"].values
     if not np.isfinite(measured).any():
         return np.full(len(measured), np.nan)
-    dark = max(DARK * typical(measured), np.finfo(float).tiny)
-    values: np.ndarray = (table["I_modelled"].values - measured) / np.maximum(measured, dark)
+    values: np.ndarray = (table["I_modelled"].values - measured) / np.maximum(measured, dark_below(measured))
     return values
 
 
@@ -360,8 +358,7 @@ def _polarisation(result: Optimum) -> tuple[np.ndarray, np.ndarray]:
         return np.full(size, np.nan), np.full(size, np.nan)
     modelled = table["I_modelled"].values
     measured = table["I_measured"].values if "I_measured" in table else modelled
-    dark = DARK * typical(measured)
-    light = np.where(measured > dark, measured, np.nan)
+    light = np.where(measured > dark_below(measured), measured, np.nan)
     shining = np.where(modelled == 0.0, np.nan, modelled)
     error, signal, present = np.zeros(size), np.zeros(size), np.zeros(size, dtype=bool)
     for channel in channels:

@@ -24,6 +24,7 @@ from pbrdf.instruments.reduction.map_files import MapWriter
 from pbrdf.instruments.reduction.reduce import reduce
 from pbrdf.instruments.reduction.stokes_image import reduce_frames
 from pbrdf.instruments.reduction.streaming import reduced_blocks
+from pbrdf.optics.angles import within_half_turn
 
 DETECTOR = Detector(bits=12, gain=3.0, read_noise=5.0, offset=60.0)
 
@@ -73,7 +74,11 @@ def test_what_was_found_is_read_back(tmp_path, frames, kind):
         assert set(expected) == set(file.data_vars)
         for name, values in expected.items():
             assert file[name].dims == ("series", "y", "x")
-            np.testing.assert_allclose(file[name].values[s], values, rtol=1e-6, atol=1e-6, err_msg=name)
+            there = file[name].values[s]
+            if name == "aolp":
+                # at its two ends an axis is the same: single precision may bring −89.9999999° to +90°
+                there = values + within_half_turn(there - values, 90.0)
+            np.testing.assert_allclose(there, values, rtol=1e-6, atol=1e-6, err_msg=name)
     assert file["flags"].values[1, 7, 5] == 1
     assert file["flags"].attrs["flag_meanings"] == "saturated dead dark not_yet_reduced"
     assert np.isnan(file["I"].values[1, 7, 5])

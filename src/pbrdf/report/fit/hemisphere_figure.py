@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pbrdf.inversion.statistics import dark_below
 from pbrdf.report.dataset.cuts import in_plane
 from pbrdf.report.dataset.describe import short_name
 from pbrdf.report.dataset.panels import dress_hemisphere
@@ -64,9 +65,8 @@ def hemisphere_figure(report: Report) -> Figure | None:
         for row, name in zip(axes, channels, strict=True):
             residual = points.modelled[name] - channels[name].measured
             if name == "intensity":
-                with np.errstate(divide="ignore", invalid="ignore"):
-                    residual = 100.0 * np.where(channels[name].measured > 0.0, residual, np.nan)
-                    residual = residual / channels[name].measured
+                seen = channels[name].measured
+                residual = 100.0 * residual / np.maximum(seen, dark_below(seen))
             finite = np.abs(residual[np.isin(measured.group, shown) & np.isfinite(residual)])
             limit = float(np.quantile(finite, _SPAN)) if finite.size and finite.max() > 0.0 else 1.0
             if name == "intensity":

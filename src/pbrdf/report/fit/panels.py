@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pbrdf.inversion.statistics import dark_below
 from pbrdf.report.dataset.panels import (
     channel_label,
     cut_axis_label,
@@ -79,8 +80,7 @@ def difference_panel(ax: Axes, points: FittedPoints, shown: ShownCuts, name: str
     measured = points.measured.channel(name).measured
     differences = points.modelled[name] - measured
     if name == "intensity":
-        with np.errstate(divide="ignore", invalid="ignore"):
-            differences = np.where(measured > 0.0, 100.0 * differences / measured, np.nan)
+        differences = 100.0 * differences / np.maximum(measured, dark_below(measured))
     ax.axhline(0.0, color="black", linewidth=0.8, zorder=1)
     for cut, look in zip(shown.cuts, shown.looks, strict=True):
         held = points.held_out[cut.rows]
