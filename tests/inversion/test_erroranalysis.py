@@ -60,8 +60,10 @@ def test_the_hand_computed_example():
     # right of the peak and off it: θ_r = 50° and 70°
     assert one.dolp_right_of_peak == pytest.approx((-0.01 - 0.04) / 2.0)
     assert one.relative_right_of_peak == pytest.approx((0.1 - 0.2) / 2.0)
-    # group 2: the point measured at 0 has no relative error, the one in backscatter lies left of the peak
-    assert two.relative.count == 3 and two.intensity.count == 4 and two.dolp.count == 3
+    # group 2: what is measured at 0 is relative to 5 % of the median, 1.5, as in the table of errors; in backscatter it
+    # lies left of the peak
+    assert two.relative.largest == pytest.approx(0.1 / 0.075) and two.relative.worst.index == 7
+    assert two.relative.count == 4 and two.intensity.count == 4 and two.dolp.count == 3
     assert two.strongest_specular.intensity_error == pytest.approx(2.0)
     assert two.dolp_right_of_peak == pytest.approx(-0.03)
     assert analysis.dolp.largest == pytest.approx(-0.04) and analysis.dolp.worst.group == "1"
@@ -83,7 +85,7 @@ def test_only_fitted_points_count_in_the_overall_structure():
 
 def test_sentences_say_where_and_which_sign():
     text = "\n".join(error_analysis(by_hand()).sentences())
-    assert "largest -25.00% at θ_i = 40°, θ_r = 60°, group 2" in text
+    assert "largest +133.33% at θ_i = 40°, θ_r = 10° in backscatter, group 2" in text
     assert (
         "Group 1: -10.00% in intensity and -0.0200 in DoLP at the strongest specular point; +10.00%" in text
     )
