@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from pbrdf.files.plain_numbers import json_from_text, number_from_text, toml_from_text
+from pbrdf.files.plain_numbers import count_from_text, json_from_text, number_from_text, toml_from_text
 
 
 @pytest.mark.parametrize(
@@ -52,3 +52,10 @@ def test_a_toml_text_that_is_none_says_why(text):
 def test_texts_that_are_right():
     assert json_from_text('{"a": [1, 2.5]}') == {"a": [1, 2.5]}
     assert toml_from_text("a = 1_000") == {"a": 1000}
+
+
+@pytest.mark.parametrize("text", ["", "-1", "+1", "1.0", "1_0", "٣", " 1", "9" * 5000])
+def test_what_is_no_count(text):
+    with pytest.raises(ValueError, match="is not a count"):
+        count_from_text(text)
+    assert count_from_text("007") == 7

@@ -174,7 +174,7 @@ def calibrate(
 def _cells(text: str | None) -> tuple[int, int]:
     if text is None:
         return (1, 1)
-    match = re.fullmatch(r"\s*(\d+)\s*[x×,]\s*(\d+)\s*", text)
+    match = re.fullmatch(r"\s*([0-9]{1,6})\s*[x×,]\s*([0-9]{1,6})\s*", text)
     if match is None or 0 in (int(match[1]), int(match[2])):
         raise PbrdfError(f"--grid {text!r}: give rows and columns of cells, for example 8x8")
     return int(match[1]), int(match[2])

@@ -309,7 +309,7 @@ def _worker(text: str | None) -> tuple[int, int] | None:
     """Number of a worker, and how many there are."""
     if text is None:
         return None
-    match = re.fullmatch(r"\s*(\d{1,9})\s*/\s*(\d{1,9})\s*", text)
+    match = re.fullmatch(r"\s*([0-9]{1,9})\s*/\s*([0-9]{1,9})\s*", text)
     if match is None or not 1 <= int(match[1]) <= int(match[2]):
         raise PbrdfError(f"--worker {text!r}: give i/N, counted from 1, for example 1/8")
     return int(match[1]), int(match[2])

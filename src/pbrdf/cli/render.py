@@ -256,7 +256,7 @@ def _wavelengths(text: str | None) -> list[float | None]:
 def _size(text: str | None) -> tuple[int, int] | None:
     if text is None:
         return None
-    match = re.fullmatch(r"\s*(\d{1,6})\s*[xX×]\s*(\d{1,6})\s*", text)
+    match = re.fullmatch(r"\s*([0-9]{1,6})\s*[xX×]\s*([0-9]{1,6})\s*", text)
     if match is None:
         raise PbrdfError(f"--size {text!r}: give WIDTHxHEIGHT, for example 512x512")
     width, height = int(match[1]), int(match[2])

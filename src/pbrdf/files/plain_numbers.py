@@ -12,9 +12,11 @@ import tomllib
 from collections.abc import Callable
 from typing import Any
 
-__all__ = ["json_from_text", "number_from_text", "toml_from_text"]
+__all__ = ["count_from_text", "json_from_text", "number_from_text", "toml_from_text"]
 
 _NUMBER = re.compile(r"\s*[-+]?((\d+\.?\d*|\.\d+)(e[-+]?\d+)?|nan|inf|infinity)\s*", re.ASCII | re.IGNORECASE)
+
+_COUNT = re.compile(r"[0-9]{1,18}")
 
 
 def number_from_text(text: str) -> float:
@@ -22,6 +24,13 @@ def number_from_text(text: str) -> float:
     if _NUMBER.fullmatch(text) is None:
         raise ValueError(f"{text!r} is not a number")
     return float(text)
+
+
+def count_from_text(text: str) -> int:
+    """The whole number from 0 that a text is; raises ValueError if it is none, or longer than 18 digits."""
+    if _COUNT.fullmatch(text) is None:
+        raise ValueError(f"{text!r} is not a count")
+    return int(text)
 
 
 def json_from_text(text: str | bytes) -> Any:

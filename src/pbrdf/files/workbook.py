@@ -22,6 +22,7 @@ from xml.parsers import expat
 
 from pbrdf.errors import DataError
 from pbrdf.files.numbers import to_number
+from pbrdf.files.plain_numbers import count_from_text
 
 __all__ = ["is_workbook", "sheet_texts"]
 
@@ -150,15 +151,21 @@ def _open_document_extent(xml: bytes) -> tuple[int, int]:
     sizes = [(0, 0)]
     rows = used_rows = columns = used_columns = widest = 0
 
+    def repeated(attributes: dict[str, str], what: str) -> int:
+        try:
+            return count_from_text(attributes.get(f"table:number-{what}-repeated", "1"))
+        except ValueError:
+            return 1
+
     def start(tag: str, attributes: dict[str, str]) -> None:
         nonlocal rows, used_rows, columns, used_columns, widest
         if tag == "table:table":
             rows = used_rows = widest = 0
         elif tag == "table:table-row":
             columns = used_columns = 0
-            rows += int(attributes.get("table:number-rows-repeated", 1))
+            rows += repeated(attributes, "rows")
         elif tag in ("table:table-cell", "table:covered-table-cell"):
-            columns += int(attributes.get("table:number-columns-repeated", 1))
+            columns += repeated(attributes, "columns")
             if any(name.startswith("office:") or name == "table:formula" for name in attributes):
                 used_columns = columns
 

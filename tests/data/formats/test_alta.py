@@ -121,6 +121,8 @@ def test_a_binary_file_holds_the_same(text_file, tmp_path):
         ("\t0.4", "", "line 6: there are 3 numbers; 3 coordinates and 1 values"),
         ("\t0.4", "\tx", "line 6: .*'x' is not a number"),
         ("#DIM 3 1", "#DIM 3", "no '#DIM n m'"),
+        ("#DIM 3 1", f"#DIM 3 {'1' * 5000}", "no '#DIM n m'"),
+        ("#DIM 3 1", "#DIM 3 ١", "no '#DIM n m'"),
         (SMALL[SMALL.index("0.2\t") :], "", "there are no rows"),
     ],
 )

@@ -27,6 +27,7 @@ from pbrdf.data.formats.declaration import Reader
 from pbrdf.data.formats.number_lines import NumberLines
 from pbrdf.data.formats.scalar_rows import incidence_groups, scalar_rows
 from pbrdf.errors import DataError
+from pbrdf.files.plain_numbers import count_from_text
 from pbrdf.files.text import first_bytes
 from pbrdf.optics.half_difference import directions
 
@@ -124,10 +125,12 @@ def read_alta(path: str | Path) -> xr.Dataset:
 
 def _understood(path: Path, header: dict[str, str]) -> tuple[str, int, int, str]:
     """Name of the parametrisation, counts of coordinates and values, and what the values are."""
-    counts = header.get("DIM", "").split()
-    if len(counts) != 2 or not all(count.isascii() and count.isdigit() and int(count) for count in counts):
+    try:
+        n, m = map(count_from_text, header.get("DIM", "").split())
+    except ValueError:
+        n = m = 0
+    if not (n and m):
         raise DataError(f"{path}: the header states no '#DIM n m', two counts from 1")
-    n, m = (int(count) for count in counts)
     name = header.get("PARAM_IN", "UNKNOWN_INPUT")
     if name not in _PARAM_IN:
         raise DataError(
@@ -169,18 +172,17 @@ def _binary(path: Path) -> tuple[dict[str, str], _Array, None] | None:
     header = _keys(head[: start.start()].decode("latin-1").splitlines())
     _, n, m, _ = _understood(path, header)
     order = {"little": "<", "big": ">"}.get(header.get("ENDIAN", ""))
-    count = header.get("SAMPLE_COUNT", "")
-    if (
-        order is None
-        or header.get("PRECISION") != "ieee754-double"
-        or not (count.isascii() and count.isdigit())
-    ):
+    try:
+        count = count_from_text(header.get("SAMPLE_COUNT", ""))
+    except ValueError:
+        count = None
+    if order is None or header.get("PRECISION") != "ieee754-double" or count is None:
         raise DataError(
             f"{path}: ENDIAN, PRECISION ieee754-double or SAMPLE_COUNT of the binary file is not stated"
         )
     width = n + m * (1 + {"1": 1, "2": 2}.get(header.get("VS", "0"), 0))
     body = path.read_bytes()[start.end() :]
-    wanted = int(count) * width * 8
+    wanted = count * width * 8
     if len(body) < wanted:
         raise DataError(
             f"{path}: {count} samples are {wanted} bytes, but there are {len(body)}: it is truncated"

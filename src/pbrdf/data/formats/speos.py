@@ -44,7 +44,7 @@ from pbrdf.data.select import match_wavelengths
 __all__ = ["READER", "read_speos"]
 
 _FIRST = re.compile(
-    r"OPTIS\s*-\s*(?P<kind>anisotropic bsdf|brdf) surface file v(?P<version>\d+)", re.IGNORECASE
+    r"OPTIS\s*-\s*(?P<kind>anisotropic bsdf|brdf) surface file v(?P<version>[0-9]{1,9})", re.IGNORECASE
 )
 #: Earlier versions stand for another order of the lines.
 _OLDEST = 7
