@@ -17,7 +17,7 @@ import numpy as np
 
 from pbrdf.data.schema import written
 from pbrdf.inversion.optimum import Optimum
-from pbrdf.inversion.statistics import dark_below
+from pbrdf.inversion.statistics import relative_errors
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -235,7 +235,7 @@ def error_analysis(result: Optimum) -> ErrorAnalysis:
         return table[name].values if name in table else nan
 
     measured, intensity_error = column("I_measured"), column("I_residual")
-    relative_error = intensity_error / np.maximum(measured, dark_below(measured))
+    relative_error = relative_errors(column("I_modelled"), measured)
     theta_i, theta_r, phi = (table[name].values for name in ("theta_i", "theta_r", "phi"))
     # tilt of the mirror facet along the plane of incidence, positive where the viewer is farther out
     offset = np.arctan2(np.sin(theta_r) * np.cos(phi) - np.sin(theta_i), np.cos(theta_i) + np.cos(theta_r))

@@ -10,7 +10,7 @@ import numpy as np
 
 from pbrdf.errors import FitError
 from pbrdf.files.plain_numbers import number_from_text
-from pbrdf.inversion.statistics import dark_below
+from pbrdf.inversion.statistics import relative_errors
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -149,10 +149,8 @@ def prediction_errors(comparison: xr.Dataset, where: np.ndarray) -> Prediction:
     def errors(channel: str, relative: bool) -> np.ndarray:
         if f"{channel}_measured" not in comparison:
             return np.empty(0)
-        measured = comparison[f"{channel}_measured"].values[where]
-        error = comparison[f"{channel}_modelled"].values[where] - measured
-        if relative:
-            error = error / np.maximum(measured, dark_below(comparison[f"{channel}_measured"].values))
+        modelled, measured = (comparison[f"{channel}_{kind}"].values for kind in ("modelled", "measured"))
+        error = (relative_errors(modelled, measured) if relative else modelled - measured)[where]
         values: np.ndarray = error[np.isfinite(error)]
         return values
 

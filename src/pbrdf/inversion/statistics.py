@@ -15,6 +15,7 @@ __all__ = [
     "goodness",
     "middle",
     "prior_spread",
+    "relative_errors",
     "typical",
     "typical_of_each",
 ]
@@ -122,6 +123,12 @@ def typical(values: np.ndarray) -> float:
 def dark_below(measured: np.ndarray) -> float:
     """Intensity, above 0, below which relative errors do not grow: 5 % of the typical one, what is darker is noise."""
     return max(DARK * typical(measured), float(np.finfo(float).tiny))
+
+
+def relative_errors(modelled: np.ndarray, measured: np.ndarray) -> np.ndarray:
+    """(modelled − measured)/measured of intensities, relative to no less than :func:`dark_below`; shape (G,)."""
+    values: np.ndarray = (modelled - measured) / np.maximum(measured, dark_below(measured))
+    return values
 
 
 def typical_of_each(size: np.ndarray) -> np.ndarray:

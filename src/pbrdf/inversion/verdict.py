@@ -20,7 +20,7 @@ from pbrdf.data.schema import is_ratio
 from pbrdf.inversion.erroranalysis import SIGNIFICANCE, sign_test
 from pbrdf.inversion.estimates import Estimate
 from pbrdf.inversion.optimum import Optimum
-from pbrdf.inversion.statistics import dark_below
+from pbrdf.inversion.statistics import dark_below, relative_errors
 from pbrdf.wording import joined
 
 __all__ = ["Level", "Stratum", "Verdict", "percent", "quotable", "verdict"]
@@ -337,8 +337,7 @@ def _intensity_errors(result: Optimum) -> np.ndarray:
     measured = table["I_measured"].values
     if not np.isfinite(measured).any():
         return np.full(len(measured), np.nan)
-    values: np.ndarray = (table["I_modelled"].values - measured) / np.maximum(measured, dark_below(measured))
-    return values
+    return relative_errors(table["I_modelled"].values, measured)
 
 
 def _polarising(result: Optimum) -> list[str]:

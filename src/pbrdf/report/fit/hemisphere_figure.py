@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pbrdf.inversion.statistics import dark_below
+from pbrdf.inversion.statistics import relative_errors
 from pbrdf.report.dataset.cuts import in_plane
 from pbrdf.report.dataset.describe import short_name
 from pbrdf.report.dataset.panels import dress_hemisphere
@@ -63,10 +63,9 @@ def hemisphere_figure(report: Report) -> Figure | None:
         figure = new_figure(2.9 * max(len(shown), 2) + 1.0, 3.2 * len(channels) + 0.5)
         axes = figure.subplots(len(channels), len(shown), squeeze=False, subplot_kw={"projection": "polar"})
         for row, name in zip(axes, channels, strict=True):
-            residual = points.modelled[name] - channels[name].measured
-            if name == "intensity":
-                seen = channels[name].measured
-                residual = 100.0 * residual / np.maximum(seen, dark_below(seen))
+            modelled, seen = points.modelled[name], channels[name].measured
+            relative = name == "intensity"
+            residual = 100.0 * relative_errors(modelled, seen) if relative else modelled - seen
             finite = np.abs(residual[np.isin(measured.group, shown) & np.isfinite(residual)])
             limit = float(np.quantile(finite, _SPAN)) if finite.size and finite.max() > 0.0 else 1.0
             if name == "intensity":

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pbrdf.inversion.statistics import dark_below
+from pbrdf.inversion.statistics import relative_errors
 from pbrdf.report.dataset.panels import (
     channel_label,
     cut_axis_label,
@@ -78,9 +78,9 @@ def fitted_cut_panel(
 def difference_panel(ax: Axes, points: FittedPoints, shown: ShownCuts, name: str) -> None:
     """Model − measured against the angle, relative for the intensity; parameters as of :func:`fitted_cut_panel`."""
     measured = points.measured.channel(name).measured
-    differences = points.modelled[name] - measured
-    if name == "intensity":
-        differences = 100.0 * differences / np.maximum(measured, dark_below(measured))
+    modelled = points.modelled[name]
+    relative = name == "intensity"
+    differences = 100.0 * relative_errors(modelled, measured) if relative else modelled - measured
     ax.axhline(0.0, color="black", linewidth=0.8, zorder=1)
     for cut, look in zip(shown.cuts, shown.looks, strict=True):
         held = points.held_out[cut.rows]
