@@ -10,7 +10,7 @@ import xarray as xr
 
 from pbrdf.data.schema import STOKES_AXES
 from pbrdf.errors import DataError
-from pbrdf.optics.stokes import STOKES
+from pbrdf.optics.stokes import STOKES, stokes_places
 
 __all__ = ["few", "in_stokes_order", "require_same_labels"]
 
@@ -29,11 +29,12 @@ def in_stokes_order(dataset: xr.Dataset) -> xr.Dataset:
     for axis in STOKES_AXES:
         if axis not in dataset.coords or dataset[axis].dims != (axis,):
             continue
-        labels = dataset[axis].values.astype(str).tolist()
-        if sorted(labels) != sorted(STOKES):
+        labels = dataset[axis].values.astype(str)
+        places = stokes_places(labels)
+        if places is None:
             raise DataError(f"the coordinate {axis} must be {', '.join(STOKES)}, not {', '.join(labels)}")
-        if labels != list(STOKES):
-            dataset = dataset.isel({axis: [labels.index(name) for name in STOKES]})
+        if places != sorted(places):
+            dataset = dataset.isel({axis: places})
     return dataset
 
 

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from pbrdf.errors import DataError
+from pbrdf.optics.stokes import stokes_places
 
 __all__ = ["cloude_entropy", "coherency_eigenvalues", "depolarization_index", "matrices_of", "normalized"]
 
@@ -135,12 +136,10 @@ def matrices_of(mueller: Any) -> tuple[np.ndarray, Callable[..., Any]]:
             f"Mueller matrices have the dimensions {' and '.join(own)} of the length 4, these have "
             f"{dict(mueller.sizes)}"
         )
-    labels = list("IQUV")
     for dim in own:
-        given = mueller[dim].values.tolist() if dim in mueller.coords else labels
         # other labels, numbers for instance, are taken in their order
-        if given != labels and sorted(map(str, given)) == labels:
-            mueller = mueller.sel({dim: labels})
+        if dim in mueller.coords and (places := stokes_places(mueller[dim].values.astype(str))) is not None:
+            mueller = mueller.isel({dim: places})
     labelled = mueller.transpose(..., *own)
     leading = labelled.isel(dict.fromkeys(own, 0), drop=True)
 

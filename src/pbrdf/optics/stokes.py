@@ -8,12 +8,19 @@ I = 0 there is no light and a degree is NaN.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import Any
 
-__all__ = ["STOKES", "aolp", "docp", "dolp", "dop", "ellipticity"]
+__all__ = ["STOKES", "aolp", "docp", "dolp", "dop", "ellipticity", "stokes_places"]
 
 #: The Stokes parameters in their order.
 STOKES = ("I", "Q", "U", "V")
+
+
+def stokes_places(labels: Iterable[str]) -> list[int] | None:
+    """Where I, Q, U and V stand among the labels of an axis, in this order; None if these are other labels."""
+    given = list(labels)
+    return [given.index(name) for name in STOKES] if sorted(given) == sorted(STOKES) else None
 
 
 def dolp(stokes: Any) -> Any:
