@@ -15,9 +15,6 @@ if TYPE_CHECKING:
 
 __all__ = ["is_paint", "known_wavelength", "models_at", "open_model", "open_single_model"]
 
-#: Wavelengths that differ by no more are the same, nm.
-_SAME = 0.5
-
 
 def open_model(source: str, wavelength: float | None = None) -> Model:
     """A model from a JSON file, the folder of a fit, JSON text, or the name of a bundled paint.
@@ -73,6 +70,7 @@ def models_at(source: str, wavelengths: Sequence[float | None]) -> list[Model] |
     PbrdfError
         If none is chosen, or the fit knows one of them not.
     """
+    from pbrdf.data.select import WAVELENGTH_TOLERANCE
     from pbrdf.inversion.stored_result import FILE_NAME
 
     folder = Path(source)
@@ -99,7 +97,7 @@ def models_at(source: str, wavelengths: Sequence[float | None]) -> list[Model] |
                 f"--wavelength; {folder / 'model.json'} is that of {next(iter(known)):g} nm"
             )
         nearest = min(known, key=lambda one: abs(one - wanted))
-        if not abs(nearest - wanted) <= _SAME:
+        if not abs(nearest - wanted) <= WAVELENGTH_TOLERANCE:
             raise PbrdfError(f"--wavelength {wanted:g}: {source} has parameters at {few} nm")
         models.append(known[nearest])
     return models

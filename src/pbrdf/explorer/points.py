@@ -15,6 +15,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from pbrdf.data.origin import of_rows
+from pbrdf.data.select import WAVELENGTH_TOLERANCE
 from pbrdf.errors import PbrdfError
 from pbrdf.explorer.fit_process import process_of
 from pbrdf.explorer.session import Emit
@@ -46,8 +47,6 @@ _NAMES = {"q": "Q/I", "u": "U/I", "v": "V/I"}
 _FIRST_COLUMN = {"Q/I": "m10", "U/I": "m20", "V/I": "m30"}
 #: Groups or angles that the page lists, at most.
 _MOST_LISTED = 200
-#: Half the width within which a wavelength is the chosen one, nm.
-_WAVELENGTH_TOLERANCE = 0.5
 #: Points that a page has shown, by data set and wavelength.
 _measured: WeakKeyDictionary[Workspace, dict[Any, Measured]] = WeakKeyDictionary()
 
@@ -108,7 +107,7 @@ class Measured:
         """The points of a wavelength in nm; None for all."""
         rows = np.arange(whole.sizes["geometry"])
         if wavelength is not None:
-            rows = np.flatnonzero(np.abs(whole["wavelength"].values - wavelength) <= _WAVELENGTH_TOLERANCE)
+            rows = np.flatnonzero(np.abs(whole["wavelength"].values - wavelength) <= WAVELENGTH_TOLERANCE)
         dataset = of_rows(whole, rows, whole.isel(geometry=rows)) if wavelength is not None else whole
         observations = Observations.from_dataset(dataset)
         return cls(
@@ -271,7 +270,7 @@ def chosen_data(state: State, workspace: Workspace) -> Choice | None:
         wavelength = wavelengths[0] if len(wavelengths) > 1 else None
     else:
         wavelength = number(wavelength, "settings.data.wavelength")
-        if not any(abs(w - wavelength) <= _WAVELENGTH_TOLERANCE for w in wavelengths):
+        if not any(abs(w - wavelength) <= WAVELENGTH_TOLERANCE for w in wavelengths):
             listed = ", ".join(f"{w:g}" for w in wavelengths[:20]) or "none"
             raise StateError(
                 "settings.data.wavelength", f"{wavelength:g} nm was not measured; there are {listed}"

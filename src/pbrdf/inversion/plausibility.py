@@ -82,9 +82,10 @@ def plausibility(result: Optimum, dataset: xr.Dataset | None = None) -> list[Fin
         The energy balance and realisability first, then parameters, lobe and measured range; never empty.
     """
     attributes = {**result.comparison.attrs, **(dataset.attrs if dataset is not None else {})}
+    models = _models(result)
     return [
-        _energy(result, attributes),
-        _realisability(_models(result)),
+        _energy(result, models, attributes),
+        _realisability(models),
         *_parameters(result, verdict(result).level),
         _lobe(result),
         *_range(result),
@@ -96,10 +97,10 @@ def _models(result: Optimum) -> dict[str, Model]:
     return {f", {nm:g} nm": model for nm, model in result.models.items()} or {"": result.model}
 
 
-def _energy(result: Optimum, attributes: dict[Any, Any]) -> Finding:
+def _energy(result: Optimum, models: dict[str, Model], attributes: dict[Any, Any]) -> Finding:
     incidence = np.deg2rad(INCIDENCES)
     reflectances = {
-        at: directional_hemispherical_reflectance(model, incidence) for at, model in _models(result).items()
+        at: directional_hemispherical_reflectance(model, incidence) for at, model in models.items()
     }
     at, reflectance = max(reflectances.items(), key=lambda item: float(item[1].max()))
     worst = int(np.argmax(reflectance))
