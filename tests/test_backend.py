@@ -208,7 +208,9 @@ class TestDrJitImportedBefore:
             "import numpy as np, pbrdf, pbrdf.backend, pbrdf.rendering; pbrdf.rendering.register(); "
             "s = mi.load_dict({'type': 'scene', 'integrator': {'type': 'path'}, 'light': {'type': 'constant'}, "
             "'ball': {'type': 'sphere', 'bsdf': {'type': 'pbrdf', 'paint': 'white'}}, "
-            "'sensor': {'type': 'perspective', 'film': {'type': 'hdrfilm', 'width': 4, 'height': 4}}}); "
+            "'sensor': {'type': 'perspective', 'film': {'type': 'hdrfilm', 'width': 4, 'height': 4, "
+            # what Mitsuba would say of another format goes to the same stream
+            "'pixel_format': 'luminance'}}}); "
             "print(bool(np.isfinite(mi.render(s, spp=4)).all()))",
         )
         assert "True" in run.stdout
